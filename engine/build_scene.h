@@ -1,0 +1,44 @@
+// glTF to .shoal: flattens the node graph, bakes meshes that one node uses into a world object, keeps meshes that
+// several nodes share as instanced objects, streams triangles, builds treelets, tiles textures, writes tables.
+// Called by bins. Parallel inside. Cost: see docs/measuring.md.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "io/gltf_document.h"
+#include "io/result.h"
+
+namespace shoal {
+
+struct BuildProgress {
+  const char* stage = "";   ///< "reading", "building", "textures", "writing"
+  double fraction = 0;      ///< of the stage
+};
+
+struct SceneBuildOptions {
+  uint32_t treelet_bytes = 256u << 10;
+  unsigned threads = 0;  ///< 0: all
+  gltf::Limits limits;
+  std::function<void(const BuildProgress&)> progress;  ///< may be empty; called from the building thread
+};
+
+struct SceneBuildReport {
+  uint64_t triangles_count = 0, instanced_triangles_count = 0, degenerate_count = 0;
+  uint64_t treelets_count = 0, instances_count = 0, objects_count = 0;
+  uint64_t file_bytes = 0, geometry_bytes = 0, source_read_bytes = 0;
+  double sah_cost = 0;
+  double seconds = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Fails with: kInput, kUnsupported, kStorage; nothing is left under `output` then.
+Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
+                                     const SceneBuildOptions& options);
+
+/// Hash of everything a build depends on: JSON, sizes and modification times of the files it names, options, version.
+Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
+
+}  // namespace shoal

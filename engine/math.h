@@ -1,0 +1,24 @@
+// The few transcendental functions that a picture depends on, each implemented once from IEEE + - * / sqrt only: libm
+// picks its code by the processor, so its bits may differ between machines. Accuracy is stated and tested.
+#pragma once
+
+namespace shoal {
+
+inline constexpr float kPi = 3.14159265358979323846f;
+
+struct SinCos {
+  float sin, cos;
+};
+/// Absolute error below 2^-22 for |x| <= 2^15; computed in double by Cody-Waite reduction and a minimax polynomial.
+SinCos sin_cos(float x);
+/// Absolute error below 2^-21 rad; arc_tangent(0, 0) = 0.
+float arc_tangent(float y, float x);
+/// Absolute error below 2^-21 rad; the argument is clamped to [-1, 1].
+float arc_cosine(float x);
+/// sRGB transfer functions of IEC 61966-2-1; relative error below 2^-18.
+float srgb_to_linear(float encoded);
+float linear_to_srgb(float linear);
+/// x^5 by multiplication (Schlick).
+inline float power5(float x) { return (x * x) * (x * x) * x; }
+
+}  // namespace shoal

@@ -1,0 +1,86 @@
+// Shading: what a hit means. Emission with multiple importance sampling, one light sample (a shadow ray with the
+// radiance that it would bring), one sampled bounce, Russian roulette. The same function serves every order, so
+// all give the same bits. Called by engine/render_*. Any number of threads, one Shader each.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "engine/path_state.h"
+#include "engine/scene.h"
+#include "io/page_cache.h"
+
+namespace shoal {
+
+/// --environment: constant radiance or an equirectangular picture (glTF axes: +y up; u = 0.5 looks along -z).
+struct EnvironmentOptions {
+  enum class Kind : uint8_t { kNone, kConstant, kImage } kind = Kind::kNone;
+  Vec3 radiance{0};
+  std::string path;
+};
+
+struct ShadingOptions {
+  uint32_t bounces = 8;         ///< path vertices after the first that may be shaded; 0: direct light only
+  uint32_t roulette_start = 3;  ///< the first bounce at which Russian roulette may end a path
+  uint64_t seed = 0;
+  EnvironmentOptions environment;
+};
+
+/// Tables shared by all threads: light sampling distributions, environment map and its distribution, directional
+/// albedo tables. Immutable. Fails with: kInput (environment file).
+class ShadingTables {
+ public:
+  static Result<std::unique_ptr<ShadingTables>> create(FileSystem& fs, const Scene& scene,
+                                                       const ShadingOptions& options);
+  ~ShadingTables();
+  uint64_t resident_bytes() const;
+  bool has_lights() const;  ///< anything a shadow ray could be sent to
+
+  struct Impl;
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  explicit ShadingTables(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What a shaded vertex asks for. Directions need not be normalised; the ray starts at t = 0 (exclusive).
+struct ShadeResult {
+  bool has_shadow = false;
+  Vec3 shadow_origin, shadow_direction;
+  float shadow_t_max = 0;  ///< exclusive
+  bool has_bounce = false;
+  Vec3 bounce_origin, bounce_direction;
+};
+
+struct ShadeCounters {
+  uint64_t vertices_shaded_count = 0;
+  uint64_t texture_lookups_count = 0;
+  uint64_t invalid_samples_count = 0;  ///< contributions that were not finite: dropped, counted, reported
+};
+
+class Shader {
+ public:
+  /// `cache` serves texture tiles; at most one is pinned at a time.
+  Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache);
+
+  /// Shades path.hit. Requires: path.hit.valid(), both rays of the vertex before are home. `geometry` is the hit
+  /// treelet's decoded page, `attributes` its attribute page or empty. Adds emission to path.radiance, sets
+  /// path.shadow_radiance, and, when a bounce goes on, throughput, bsdf_pdf and ++bounce.
+  /// Fails with: what the cache returns.
+  Status shade_hit(PathState& path, std::span<const std::byte> geometry, std::span<const std::byte> attributes,
+                   ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
+  /// The ray left the scene: adds the environment with MIS.
+  void shade_miss(PathState& path, ShadeCounters& counters);
+
+ private:
+  const Scene* scene_;
+  const ShadingTables* tables_;
+  const ShadingOptions* options_;
+  PageCache* cache_;
+  PagePin tile_;  ///< the texture tile read last
+};
+
+}  // namespace shoal

@@ -1,0 +1,83 @@
+// The file layer: every byte that enters or leaves the process passes through a FileSystem.
+// Product code uses posix_file_system(); tests put a memory or a fault-injecting one in its place
+// (tests/support/). Thread rule: a file may be read from many threads at once, written from one.
+// Cost: one virtual call and one system call an operation.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "io/result.h"
+
+namespace shoal {
+
+class ReadableFile {
+ public:
+  virtual ~ReadableFile() = default;
+  /// Fills `out` from byte `offset`. Short reads and EINTR are retried; reaching the end of the file
+  /// first fails. Fails with: kStorage (the message names file, offset, expected and found).
+  virtual Status read_at(uint64_t offset, std::span<std::byte> out) = 0;
+  virtual uint64_t size_bytes() const = 0;
+  virtual const std::string& path() const = 0;
+};
+
+class WritableFile {
+ public:
+  virtual ~WritableFile() = default;
+  /// Fails with: kStorage (disk full is named as such).
+  virtual Status write_at(uint64_t offset, std::span<const std::byte> bytes) = 0;
+  virtual Status sync() = 0;
+  virtual const std::string& path() const = 0;
+};
+
+enum class ReadMode : uint8_t {
+  kBuffered,  ///< through the operating system's cache
+  kDirect,    ///< O_DIRECT where the file system takes it, else buffered; any offset and size may be asked
+};
+
+class FileSystem {
+ public:
+  virtual ~FileSystem() = default;
+  /// Fails with: kInput when the file does not exist or cannot be opened or is a directory.
+  virtual Result<std::unique_ptr<ReadableFile>> open(const std::string& path, ReadMode mode) = 0;
+  /// Creates or truncates. Fails with: kStorage.
+  virtual Result<std::unique_ptr<WritableFile>> create(const std::string& path) = 0;
+  /// Atomic replace, then fsync of the directory. Fails with: kStorage.
+  virtual Status rename(const std::string& from, const std::string& to) = 0;
+  virtual Status remove(const std::string& path) = 0;
+};
+
+FileSystem& posix_file_system();
+
+/// A file that appears under its final name whole or not at all: bytes go to a temporary name beside it
+/// (`.NAME.tmp-PID-N`), commit() syncs, renames and syncs the directory; a destructor without commit()
+/// removes the temporary.
+class AtomicFile {
+ public:
+  static Result<AtomicFile> create(FileSystem& fs, const std::string& final_path);
+  AtomicFile(AtomicFile&&) noexcept;
+  AtomicFile& operator=(AtomicFile&&) noexcept;
+  ~AtomicFile();
+
+  Status append(std::span<const std::byte> bytes);
+  Status write_at(uint64_t offset, std::span<const std::byte> bytes);
+  uint64_t size_bytes() const { return size_bytes_; }
+  Status commit();
+
+ private:
+  AtomicFile(FileSystem& fs, std::unique_ptr<WritableFile> file, std::string final_path);
+  FileSystem* fs_ = nullptr;
+  std::unique_ptr<WritableFile> file_;
+  std::string final_path_;
+  uint64_t size_bytes_ = 0;
+};
+
+/// The whole of a small file. Fails with: kInput when larger than `limit_bytes`.
+Result<std::string> read_whole_file(FileSystem& fs, const std::string& path, uint64_t limit_bytes);
+/// Writes a small file atomically.
+Status write_whole_file(FileSystem& fs, const std::string& path, std::span<const std::byte> bytes);
+
+}  // namespace shoal

@@ -1,0 +1,169 @@
+// The glTF 2.0 document: the JSON of a .gltf or the JSON chunk of a .glb, parsed with nlohmann-json and checked
+// into plain structs. After load() every index is in range, every accessor lies inside its view and every view
+// inside its buffer by 64-bit arithmetic, the node graph is a forest of bounded depth, URIs stay inside
+// the scene's folder. No buffer byte is read here (see gltf_accessor.h), no image is decoded.
+// Called by engine/build_scene. A document is immutable after load().
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/file.h"
+#include "io/result.h"
+
+namespace shoal::gltf {
+
+/// Budgets against hostile input; over a budget is ErrorCode::kInput.
+struct Limits {
+  uint64_t json_bytes = 1ull << 30;
+  uint64_t objects_count = 1ull << 24;      ///< of each array of the document
+  uint32_t node_depth = 512;
+  uint64_t instances_count = 1ull << 24;    ///< nodes with meshes, after flattening
+  uint64_t image_pixels = 1ull << 28;       ///< of one image
+};
+
+enum class ComponentType : uint16_t { kByte = 5120, kUnsignedByte, kShort, kUnsignedShort, kUnsignedInt = 5125, kFloat };
+uint32_t component_bytes(ComponentType type);
+
+struct Buffer {
+  uint64_t byte_length = 0;
+  std::string path;         ///< of an external file; empty: embedded
+  uint64_t path_offset = 0; ///< where the bytes begin (a .glb's BIN chunk: the .glb itself)
+  std::vector<std::byte> embedded;  ///< decoded data: URI
+};
+
+struct BufferView {
+  uint32_t buffer = 0;
+  uint64_t byte_offset = 0, byte_length = 0;
+  uint32_t byte_stride = 0;  ///< 0: tightly packed
+};
+
+struct SparseAccessor {
+  uint64_t count = 0;
+  uint32_t indices_view = 0;
+  uint64_t indices_offset = 0;
+  ComponentType indices_type = ComponentType::kUnsignedInt;
+  uint32_t values_view = 0;
+  uint64_t values_offset = 0;
+};
+
+struct Accessor {
+  std::optional<uint32_t> view;  ///< none: zeros (then sparse values)
+  uint64_t byte_offset = 0;
+  uint64_t count = 0;
+  uint32_t components = 1;       ///< 1 SCALAR, 2, 3, 4 VECn, 4 MAT2, 9 MAT3, 16 MAT4
+  bool matrix = false;
+  ComponentType type = ComponentType::kFloat;
+  bool normalized = false;
+  std::optional<SparseAccessor> sparse;
+};
+
+enum class PrimitiveMode : uint8_t { kPoints, kLines, kLineLoop, kLineStrip, kTriangles, kTriangleStrip, kTriangleFan };
+
+struct Primitive {
+  std::map<std::string, uint32_t> attributes;  ///< POSITION, NORMAL, TEXCOORD_0, ... -> accessor
+  std::optional<uint32_t> indices;
+  std::optional<uint32_t> material;
+  PrimitiveMode mode = PrimitiveMode::kTriangles;
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<Primitive> primitives;
+};
+
+struct TextureInfo {
+  uint32_t texture = 0;
+  uint32_t texcoord = 0;
+};
+
+enum class AlphaMode : uint8_t { kOpaque, kMask, kBlend };
+
+struct Material {
+  std::string name;
+  std::array<double, 4> base_color{1, 1, 1, 1};
+  double metallic = 1, roughness = 1;
+  std::array<double, 3> emissive{0, 0, 0};
+  double emissive_strength = 1;            ///< KHR_materials_emissive_strength
+  double specular = 1;                     ///< KHR_materials_specular
+  std::array<double, 3> specular_color{1, 1, 1};
+  double ior = 1.5;                        ///< KHR_materials_ior (F0 only, until transmission is here)
+  double normal_scale = 1;
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  double alpha_cutoff = 0.5;
+  bool double_sided = false;
+  std::optional<TextureInfo> base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture,
+      specular_texture, specular_color_texture;
+};
+
+struct Sampler {
+  bool nearest_magnification = false;
+  uint32_t wrap_s = 10497, wrap_t = 10497;  ///< 33071 clamp, 33648 mirror, 10497 repeat
+};
+
+struct Image {
+  std::string name;                 ///< for messages: URI or "image N"
+  std::string path;                 ///< external file, else empty
+  std::optional<uint32_t> view;     ///< a buffer view
+  std::vector<std::byte> embedded;  ///< data: URI
+};
+
+struct Texture {
+  std::optional<uint32_t> sampler, image;
+};
+
+struct Camera {
+  std::string name;
+  bool perspective = true;
+  double yfov = 0.8, aspect_ratio = 0;      ///< 0: from the picture
+  double xmag = 1, ymag = 1;
+};
+
+enum class LightType : uint8_t { kDirectional, kPoint, kSpot };
+struct Light {                               // KHR_lights_punctual
+  std::string name;
+  LightType type = LightType::kPoint;
+  std::array<double, 3> color{1, 1, 1};
+  double intensity = 1;                      ///< candela, directional: lux
+  double inner_cone = 0, outer_cone = 0.7853981633974483;
+};
+
+struct Node {
+  std::string name;
+  std::vector<uint32_t> children;
+  std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};  ///< column-major, TRS composed
+  std::optional<uint32_t> mesh, camera, light, skin;
+};
+
+struct Document {
+  std::string path;       ///< of the .gltf or .glb
+  std::string folder;
+  uint64_t content_hash = 0;  ///< XXH3 of the JSON
+  std::vector<std::string> extensions_used, extensions_required;
+  std::vector<std::string> warnings;  ///< for the log: unknown extensions used, skins not posed, ...
+  std::vector<uint32_t> roots;        ///< nodes of the default scene (or all parentless nodes)
+  std::vector<Buffer> buffers;
+  std::vector<BufferView> views;
+  std::vector<Accessor> accessors;
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;
+  std::vector<Sampler> samplers;
+  std::vector<Image> images;
+  std::vector<Texture> textures;
+  std::vector<Camera> cameras;
+  std::vector<Light> lights;
+  std::vector<Node> nodes;
+};
+
+/// Fails with: kInput (missing, truncated, malformed, over a budget; names file and JSON place such as
+/// "accessors[3].count"), kUnsupported (extensionsRequired that are not read, named with what to do).
+Result<Document> load_document(FileSystem& fs, const std::string& path, const Limits& limits = {});
+
+/// The extensions that are read: in extensionsRequired these are accepted.
+bool extension_supported(const std::string& name);
+
+}  // namespace shoal::gltf

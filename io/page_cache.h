@@ -1,0 +1,99 @@
+// The page cache: decoded pages of one PageFile under one budget, pinned while in use.
+//
+// Properties and assumptions
+//   capacity   the sum of resident pages (rounded up to 4 KiB each) never exceeds capacity_bytes.
+//   ownership  a PagePin keeps its page resident; pins are short (one batch, one visit).
+//   threads    any number; two threads that miss the same page read it once, the second waits.
+//   order      among unpinned pages the one with the least waiting work goes first (see WaitingWork), ties
+//              by least recent use; with no WaitingWork this is plain LRU.
+//   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
+//              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
+//              most kMaxPinsPerThread pages.
+//   cost       a hit is one atomic increment and no lock; a miss reads, hashes and decompresses outside the lock.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "io/page_file.h"
+#include "io/result.h"
+
+namespace shoal {
+
+/// Counted by the caller's thread, summed by the render (io/counters.h names them).
+struct CacheCounters {
+  uint64_t page_requests_count = 0;  ///< = hits + misses
+  uint64_t page_hits_count = 0;
+  uint64_t page_misses_count = 0;
+  uint64_t page_evictions_count = 0;
+  uint64_t disk_reads_count = 0;
+  uint64_t disk_read_bytes = 0;      ///< bytes asked of the disk
+  uint64_t decoded_bytes = 0;        ///< bytes of decoded pages
+  uint64_t treelet_loads_count = 0;  ///< misses of kTreelet pages
+  uint64_t treelet_load_bytes = 0;   ///< decoded bytes of those
+  uint64_t attribute_loads_count = 0;
+  uint64_t texture_loads_count = 0;
+};
+
+class PageCache;
+
+/// Keeps one page resident. Movable; the destructor lets go.
+class PagePin {
+ public:
+  PagePin() = default;
+  PagePin(PagePin&& other) noexcept;
+  PagePin& operator=(PagePin&& other) noexcept;
+  PagePin(const PagePin&) = delete;
+  PagePin& operator=(const PagePin&) = delete;
+  ~PagePin();
+
+  explicit operator bool() const { return data_ != nullptr; }
+  PageId page() const { return page_; }
+  /// The decoded page, aligned to 64 bytes; at least 64 readable bytes follow the end (SIMD loads).
+  std::span<const std::byte> bytes() const { return {data_, size_}; }
+  void reset();
+
+ private:
+  friend class PageCache;
+  PageCache* cache_ = nullptr;
+  const std::byte* data_ = nullptr;
+  uint32_t size_ = 0;
+  PageId page_ = kNoPage;
+};
+
+/// How much work waits for a page now; called under the cache's lock when it evicts. Must not call back.
+using WaitingWork = std::function<uint64_t(PageId)>;
+
+/// Looks over a page once, when it has been decoded, so that its readers need not check it again.
+/// Fails with: kCorrupt. Called from any thread, outside the lock.
+using PageCheck = std::function<Status(const PageRecord&, std::span<const std::byte>)>;
+
+class PageCache {
+ public:
+  static constexpr unsigned kMaxPinsPerThread = 3;  ///< a treelet, its attributes, a texture tile
+
+  PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {});
+  ~PageCache();
+
+  /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread.
+  static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
+
+  /// Fails with: kStorage, kCorrupt (after which the render ends).
+  Result<PagePin> pin(PageId page, CacheCounters& counters);
+  /// A hint without a promise; used by schedulers to trace what is resident first.
+  bool resident(PageId page) const;
+  uint64_t resident_bytes() const;
+  uint64_t peak_resident_bytes() const;
+  uint64_t capacity_bytes() const;
+
+ private:
+  friend class PagePin;
+  void unpin(PageId page);
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace shoal

@@ -1,0 +1,97 @@
+// The resident top tree: one array of 8-wide nodes for the tree over instances and for the tree of every object
+// over its treelets. It says which treelet a ray enters next, front to back.
+//
+//   start: cursor = kNoIndex           next() -> first treelet entry, or nothing: the ray misses
+//   again: cursor = last child taken   next() -> the entry after it whose box begins at or before ray.t
+//
+// Called by engine/render_* between treelets. Immutable while rendering, any number of threads.
+// Cost: one test of 8 boxes a node on the way down, and one on the way up for each node with children left.
+//
+// Boxes: lo/hi are the children's bounds in float. The test (treelets/box_test.h) widens the ray by
+// RaySpace::pad, so that whatever the triangle test accepts, every box above it accepts.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "treelets/ray.h"
+#include "treelets/vector.h"
+
+namespace shoal {
+
+enum class ChildKind : uint8_t { kEmpty = 0, kNode = 1, kEntry = 2, kInstance = 3 };
+
+struct alignas(64) TopNode {  // 256 bytes
+  float lo[3][8];             //   0  [axis][slot]; an empty slot has lo = +inf, hi = -inf
+  float hi[3][8];             //  96
+  uint32_t child[8];          // 192  index of a node, an entry or an instance
+  uint32_t parent;            // 224  (parent node << 3 | slot), kNoIndex at the root of a tree
+  uint32_t level;             // 228  0 at the root of its own tree
+  ChildKind kind[8];          // 232
+  uint32_t reserved[4];       // 240  zero
+};
+static_assert(sizeof(TopNode) == 256);
+
+/// Where a leaf of an object's tree leads: a root inside a treelet.
+struct TreeletEntry {
+  TreeletId treelet = 0;
+  uint32_t root = 0;  ///< a NodeRef of treelets/treelet_layout.h
+};
+static_assert(sizeof(TreeletEntry) == 8);
+
+struct Instance {           // 128 bytes, as stored
+  Affine3 object_to_world;
+  Affine3 world_to_object;  ///< computed in double, rounded once
+  uint32_t root_node;       ///< global index of the object's root node
+  uint32_t tree_child;      ///< (node << 3 | slot) of the tree over instances that leads here
+  uint32_t identity;        ///< 1: world and object space are the same bits
+  uint32_t object;
+  float transform_error;    ///< K of docs/design.md "Numerics": max row sum of |M| |M^-1|, 1 for identity
+  float max_abs_coordinate; ///< of the object's bounds, object space
+  uint32_t reserved[2];
+};
+static_assert(sizeof(Instance) == 128);
+
+struct TraversalOptions {
+  uint32_t more_levels = 32;  ///< levels for which Ray::more is used, 0..32; less is slower, never different
+};
+
+class TopTree {
+ public:
+  TopTree() = default;
+  /// Requires: indices checked (check()). The root of the tree over instances is node 0.
+  TopTree(std::vector<TopNode> nodes, std::vector<TreeletEntry> entries, std::vector<Instance> instances,
+          TraversalOptions options = {});
+
+  /// Checks every index, kind, parent link and level of tables read from a file. Fails with: kCorrupt.
+  static Status check(std::span<const TopNode> nodes, std::span<const TreeletEntry> entries,
+                      std::span<const Instance> instances, uint32_t treelet_count);
+
+  /// Moves the ray's cursor to the next treelet entry whose box the ray enters at or before ray.t, and
+  /// returns the entry's index, or kNoIndex when there is none. `box_tests` counts nodes tested.
+  uint32_t next(Ray& ray, uint64_t& node_tests) const;
+
+  const TreeletEntry& entry(uint32_t index) const { return entries_[index]; }
+  /// The entry a ray's cursor stands on. Requires: next() returned one for this ray.
+  const TreeletEntry& current(const Ray& ray) const {
+    return entries_[nodes_[ray.cursor >> 3].child[ray.cursor & 7]];
+  }
+  const Instance& instance(uint32_t index) const { return instances_[index]; }
+  uint32_t instance_count() const { return static_cast<uint32_t>(instances_.size()); }
+  std::span<const TopNode> nodes() const { return nodes_; }
+  std::span<const TreeletEntry> entries() const { return entries_; }
+  std::span<const Instance> instances() const { return instances_; }
+  Bounds3 bounds() const;          ///< of the scene, world space
+  uint64_t resident_bytes() const;
+
+ private:
+  std::vector<TopNode> nodes_;
+  std::vector<TreeletEntry> entries_;
+  std::vector<Instance> instances_;
+  TraversalOptions options_;
+  float world_pad_scale_ = 0;   ///< see ray_space.h
+  float world_max_abs_ = 0;
+};
+
+}  // namespace shoal

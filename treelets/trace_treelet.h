@@ -1,0 +1,67 @@
+// One ray through one treelet, completely: every triangle below the entry's root that could be hit is
+// tested. Returns nothing about where the ray goes next; TopTree::next says that, and the engine routes.
+// Called by engine/render_*. Pure: reads the page, writes the ray. Any number of threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "io/result.h"
+#include "treelets/ray.h"
+#include "treelets/top_tree.h"
+
+namespace shoal {
+
+struct TraceCounters {
+  uint64_t node_tests_count = 0;      ///< 8-wide nodes tested, in treelets and top tree
+  uint64_t triangle_tests_count = 0;
+  uint64_t coverage_tests_count = 0;
+};
+
+/// Crosses treelet `treelet` (its decoded geometry page) from `entry.root` in the space of `instance`.
+/// Closest hit: ray.t and ray.hit become the smallest (t, instance, primitive) so far.
+/// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
+/// Requires: the page passed check_treelet().
+void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
+                   TraceCounters& counters);
+
+/// Checks every offset and count of a geometry page from a file, so that trace_treelet and find_triangle cannot
+/// read outside it or loop. Run once when a page is decoded. Fails with: kCorrupt.
+Status check_treelet(std::span<const std::byte> page);
+
+/// One triangle of a treelet by Hit::slot, for shading.
+struct TreeletTriangle {
+  Vec3 p0, p1, p2;      ///< object space
+  uint32_t primitive;
+  uint32_t ordinal;     ///< index of the triangle in the treelet; indexes the attribute page
+  uint32_t material;    ///< of the page when uniform, else kNoIndex: see the attribute page
+};
+/// Requires: slot comes from a hit in this page.
+TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot);
+
+/// Where a ray meets a triangle that it is known to hit: barycentrics of p1 and p2 by the same arithmetic as
+/// traversal.
+struct TrianglePoint {
+  float t, b1, b2;
+};
+TrianglePoint intersect_known(const Ray& ray, const Instance& instance, const TreeletTriangle& triangle);
+
+/// Attributes of one triangle's corners from an attribute page. Missing ones have their defaults:
+/// normal and tangent zero, colour one, uv zero.
+struct CornerAttributes {
+  Vec3 normal{0};
+  Vec4 tangent{0};
+  Vec4 color{1};
+  Vec2 uv[4] = {};
+};
+struct TriangleAttributes {
+  uint32_t material = 0;
+  CornerAttributes corner[3];
+};
+/// Fails with: kCorrupt when the page is not well formed; run once when decoded.
+Status check_attributes(std::span<const std::byte> page);
+/// Requires: a checked page, ordinal < its triangle count.
+TriangleAttributes find_attributes(std::span<const std::byte> page, uint32_t ordinal);
+
+}  // namespace shoal

@@ -1,0 +1,92 @@
+// The bytes of a treelet's geometry page: what traversal touches, and nothing else. Written by treelets/pack_treelet,
+// read by treelets/trace_treelet. Little-endian, offsets in bytes from the start of the page unless said otherwise.
+//
+//   TreeletHeader | QuantizedNode[node_count] | leaves | uint32 primitive[triangle_count] | coverage
+//
+// Leaf (4-byte aligned, from leaves_offset):
+//   LeafHeader | float x[vertex_count] | float y[] | float z[] | uint8 i0[triangle_count] | i1[] | i2[] | pad to 4
+// Vertices shared inside a leaf are stored once, positions are exact float32. i0,i1,i2 keep the corner order of
+// the source: barycentrics do not depend on packing.
+//
+// Coverage (only when coverage_offset != 0):
+//   uint32 record[triangle_count] (index, kNoIndex: opaque) | CoverageRecord[record_count] | alpha texels
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "treelets/ray.h"
+
+namespace shoal {
+
+inline constexpr uint32_t kTreeletMagic = 0x544c5254u;    // "TRLT"
+inline constexpr uint32_t kMaxLeafTriangles = 8;
+inline constexpr uint32_t kMaxLeafVertices = 24;
+inline constexpr uint32_t kMaxTreeletDepth = 96;          ///< nodes from a root to a leaf; the packer checks it
+
+struct TreeletHeader {
+  uint32_t magic;
+  uint32_t node_count;
+  uint32_t leaves_offset;
+  uint32_t leaves_bytes;
+  uint32_t triangle_count;
+  uint32_t primitives_offset;
+  uint32_t uniform_material;   ///< kNoIndex: see the attribute page
+  uint32_t coverage_offset;    ///< 0: every triangle is opaque
+  uint32_t coverage_record_count;
+  uint32_t coverage_texel_bytes;
+  uint32_t reserved[6];        ///< zero
+};
+static_assert(sizeof(TreeletHeader) == 64);
+
+/// A child of a node or a root: an inner node's index, or a leaf's offset.
+using NodeRef = uint32_t;
+inline constexpr NodeRef kEmptyRef = 0xffffffffu;
+inline constexpr NodeRef kLeafBit = 0x80000000u;
+inline constexpr bool is_leaf(NodeRef ref) { return (ref & kLeafBit) != 0; }
+/// Offset of a leaf from leaves_offset, in units of 4 bytes (below 2^27, so that Hit::slot can hold it).
+inline constexpr uint32_t leaf_offset(NodeRef ref) { return ref & ~kLeafBit; }
+
+/// Child boxes on a grid of their own: plane = origin[axis] + q * 2^exponent[axis], evaluated in float by one exact
+/// multiplication and one rounded addition. The packer makes sure that the evaluated planes enclose the child.
+/// An empty slot has child = kEmptyRef and lo > hi on every axis (lo = 255, hi = 0).
+struct QuantizedNode {        // 96 bytes
+  float origin[3];            //  0
+  int8_t exponent[3];         // 12
+  uint8_t child_count;        // 15  children fill the slots from 0
+  NodeRef child[8];           // 16
+  uint8_t lo[3][8];           // 48
+  uint8_t hi[3][8];           // 72
+};
+static_assert(sizeof(QuantizedNode) == 96);
+
+struct LeafHeader {
+  uint8_t triangle_count;     ///< 1 .. kMaxLeafTriangles
+  uint8_t vertex_count;       ///< 3 .. kMaxLeafVertices
+  uint8_t has_coverage;       ///< 1: some triangle has a coverage record
+  uint8_t reserved;
+  uint32_t first_ordinal;     ///< of its first triangle among the treelet's triangles
+};
+static_assert(sizeof(LeafHeader) == 8);
+
+/// Coverage of one triangle (treelets/coverage.h). uv are in texels of the chosen level, before wrapping, with
+/// texel centres at +0.5; the crop holds texels [crop_x, crop_x + crop_width) x [crop_y, ...) of that unwrapped space,
+/// or, when whole_level is 1, the level itself and coordinates wrap.
+struct CoverageRecord {       // 80 bytes
+  float uv[6];                //  0
+  float vertex_alpha[3];      // 24
+  float factor;               // 36
+  float cutoff;               // 40
+  int32_t crop_x, crop_y;     // 44
+  uint32_t crop_width;        // 52  0: no texture, alpha = factor * vertex alpha
+  uint32_t crop_height;       // 56
+  uint32_t texel_offset;      // 60  from the first alpha texel, row by row
+  uint8_t mode;               // 64  CoverageMode
+  uint8_t wrap_u, wrap_v;     // 65  WrapMode, for whole_level
+  uint8_t nearest;            // 67
+  uint8_t whole_level;        // 68
+  uint8_t reserved[11];       // 69
+};
+static_assert(sizeof(CoverageRecord) == 80);
+
+}  // namespace shoal
