@@ -20,7 +20,8 @@ struct BuildProgress {
 
 struct SceneBuildOptions {
   uint32_t treelet_bytes = 256u << 10;
-  unsigned threads = 0;  ///< 0: all
+  unsigned threads = 0;          ///< 0: all
+  uint64_t max_memory_bytes = 0; ///< 0: no cap; else a scene that needs more is refused before it is read
   gltf::Limits limits;
   std::function<void(const BuildProgress&)> progress;  ///< may be empty; called from the building thread
 };
@@ -34,7 +35,8 @@ struct SceneBuildReport {
   std::vector<std::string> warnings;
 };
 
-/// Fails with: kInput, kUnsupported, kStorage; nothing is left under `output` then.
+/// Fails with: kInput, kUnsupported, kStorage, kMemoryCap; nothing is left under `output` then. The same source and
+/// options give the same bytes, whatever the number of threads.
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
                                      const SceneBuildOptions& options);
 

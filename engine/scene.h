@@ -22,7 +22,9 @@ struct Scene {
   std::vector<Emitter> emitters;
   std::vector<PunctualLight> lights;
   std::vector<CameraRecord> cameras;
-  std::string build_record;  ///< JSON
+  std::vector<uint32_t> entries_by_treelet;  ///< indices of top_tree.entries(), in order of their treelet
+  std::string build_record;                  ///< JSON
+  std::string names;                         ///< JSON: {"materials": [...], "cameras": [...], "lights": [...]}
 
   uint64_t resident_bytes() const;
 };
@@ -30,7 +32,10 @@ struct Scene {
 /// Fails with: kInput (missing, not a .shoal), kCorrupt (file, place, expected, found).
 Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode, TraversalOptions traversal);
 
-/// The check that the page cache runs on every decoded page (treelet, attribute and texture pages).
-Status check_page(const PageRecord& record, std::span<const std::byte> bytes);
+/// The check that the page cache runs on every decoded page (treelet, attribute and texture pages): the page is
+/// well formed and fits the scene's tables (triangle counts, materials, the roots that the top tree enters), so that
+/// its readers need check nothing. `[&scene](auto& r, auto b) { return check_page(scene, r, b); }` is a PageCheck.
+/// Fails with: kCorrupt.
+Status check_page(const Scene& scene, const PageRecord& record, std::span<const std::byte> bytes);
 
 }  // namespace shoal

@@ -40,9 +40,12 @@ struct SceneHeader {
   uint32_t reserved[4] = {};
 };
 
+/// Geometry pages ascend from treelet to treelet, so that a page finds its treelet by binary search; the attribute
+/// page, if any, is the page after the geometry page.
 struct TreeletPages {
   PageId geometry = kNoPage;
-  PageId attributes = kNoPage;  ///< kNoPage: none
+  PageId attributes = kNoPage;   ///< kNoPage: none
+  uint32_t triangle_count = 0;   ///< of the geometry page and of the attribute page
 };
 
 struct TextureSlot {
