@@ -16,20 +16,25 @@ struct PathState {
   uint32_t pixel = 0;               ///< y * width + x in the film
   uint32_t sample = 0;
   uint32_t bounce = 0;              ///< 0: the camera ray's hit is shaded next
-  uint32_t shaded_treelet = 0;      ///< for routing, not for shading
+  uint32_t flags = 0;               ///< PathFlags: the render loop's, not the shader's
   Vec3 throughput{1};
   float bsdf_pdf = 0;               ///< solid-angle density of the direction of `ray`; 0: camera (no MIS)
   Vec3 radiance{0};
-  float reserved0 = 0;
+  uint32_t next_free = kNoIndex;    ///< link among free paths
   Vec3 shadow_radiance{0};          ///< added to radiance when the shadow ray arrives unoccluded
-  float reserved1 = 0;
-  // The ray that goes on, as it came home: written when its traversal is done.
+  float t = 0;                      ///< of `hit`
+  // The ray that goes on: origin and direction from its birth, hit and t when its traversal is done.
   Vec3 origin{0};
-  float t = 0;
+  std::atomic<uint32_t> pending{0};  ///< rays of this vertex still travelling
   Vec3 direction{0};
-  uint32_t next = kNoIndex;         ///< link of intrusive lists (waiting to be shaded, free)
+  uint32_t reserved = 0;
   Hit hit;
-  std::atomic<uint32_t> pending{0}; ///< rays of this vertex still travelling
+};
+static_assert(sizeof(PathState) == 112);
+
+enum PathFlags : uint32_t {
+  kPathGoesOn = 1,   ///< the vertex sampled a bounce: its ray travels or has come home
+  kPathCovered = 2,  ///< the camera ray hit something: counts for the film's alpha
 };
 
 }  // namespace shoal

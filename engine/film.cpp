@@ -1,0 +1,57 @@
+#include "engine/film.h"
+
+#include <bit>
+#include <mutex>
+
+namespace shoal {
+
+FixedPoint128 FixedPoint128::from_float(float value) {
+  const uint32_t bits = std::bit_cast<uint32_t>(value);
+  const int exponent = static_cast<int>((bits >> 23) & 0xff);
+  if (exponent == 0) return {};  // zero and denormals: below 2^-126
+  const unsigned __int128 mantissa = (bits & 0x7fffffu) | 0x800000u;
+  const int shift = exponent - 127 - 23 + 64;  // the value is mantissa * 2^(shift - 64)
+  unsigned __int128 magnitude = 0;
+  if (shift >= 0) {
+    magnitude = mantissa << shift;
+  } else if (shift > -24) {
+    magnitude = mantissa >> -shift;
+  }
+  const __int128 fixed = (bits >> 31) != 0 ? -static_cast<__int128>(magnitude) : static_cast<__int128>(magnitude);
+  return {static_cast<int64_t>(fixed >> 64), static_cast<uint64_t>(fixed)};
+}
+
+double FixedPoint128::to_double() const { return static_cast<double>(high) + static_cast<double>(low) * 0x1p-64; }
+
+Film::Film(uint32_t width, uint32_t height)
+    : width_(width),
+      height_(height),
+      pixels_(static_cast<size_t>(width) * height),
+      locks_(std::make_unique<SpinLock[]>(kLocks)) {}
+
+bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered) {
+  FixedPoint128 fixed[3];
+  bool inside = true;
+  for (int c = 0; c < 3; ++c) {
+    const float value = std::clamp(radiance[c], -kMaxRadiance, kMaxRadiance);
+    inside = inside && value == radiance[c];
+    fixed[c] = FixedPoint128::from_float(value);
+  }
+  Pixel& p = pixels_[pixel];
+  std::lock_guard guard(locks_[pixel % kLocks]);
+  for (int c = 0; c < 3; ++c) p.rgb[c].add(fixed[c]);
+  p.covered += covered ? 1 : 0;
+  return inside;
+}
+
+std::vector<float> Film::resolve(uint32_t samples) const {
+  std::vector<float> rgba(pixels_.size() * 4);
+  const double scale = samples > 0 ? 1.0 / samples : 0.0;
+  for (size_t i = 0; i < pixels_.size(); ++i) {
+    for (int c = 0; c < 3; ++c) rgba[i * 4 + c] = static_cast<float>(pixels_[i].rgb[c].to_double() * scale);
+    rgba[i * 4 + 3] = static_cast<float>(static_cast<double>(pixels_[i].covered) * scale);
+  }
+  return rgba;
+}
+
+}  // namespace shoal

@@ -1,0 +1,58 @@
+// The film: where the radiance of finished paths is remembered. Sums are kept in 128-bit fixed point (64 bits of
+// fraction), so that adding is exact and any order gives the same bits, for 1e-10 beside 1e10.
+// Called by engine/render_*. Threads: any number; a striped lock guards a pixel. Cost: 48 bytes a pixel.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "queues/spin_lock.h"
+#include "treelets/vector.h"
+
+namespace shoal {
+
+/// Signed 64.64 fixed point.
+struct FixedPoint128 {
+  int64_t high = 0;
+  uint64_t low = 0;
+
+  void add(const FixedPoint128& other) {
+    const uint64_t sum = low + other.low;
+    high += other.high + (sum < low ? 1 : 0);
+    low = sum;
+  }
+  /// Exact for |value| in [2^-64 * 2^23, 2^62); smaller bits are cut off towards zero. Requires: finite, |value| < 2^62.
+  static FixedPoint128 from_float(float value);
+  double to_double() const;
+};
+
+class Film {
+ public:
+  Film(uint32_t width, uint32_t height);
+  static uint64_t bytes(uint32_t width, uint32_t height) { return uint64_t{width} * height * sizeof(Pixel); }
+
+  /// Adds one sample's radiance. Returns false when a channel was clamped to kMaxRadiance (counted by the caller).
+  /// Requires: finite values.
+  bool add(uint32_t pixel, const Vec3& radiance, bool covered);
+
+  /// Mean over `samples`: width * height * 4 floats, RGBA, rows from the top; A is the covered fraction.
+  std::vector<float> resolve(uint32_t samples) const;
+
+  uint32_t width() const { return width_; }
+  uint32_t height() const { return height_; }
+
+  static constexpr float kMaxRadiance = 0x1p40f;  ///< 2^22 samples of it fit the sum
+
+ private:
+  struct Pixel {
+    FixedPoint128 rgb[3];
+    uint64_t covered = 0;
+  };
+  static constexpr uint32_t kLocks = 4096;
+  uint32_t width_, height_;
+  std::vector<Pixel> pixels_;
+  std::unique_ptr<SpinLock[]> locks_;
+};
+
+}  // namespace shoal

@@ -1,0 +1,79 @@
+// The paths in flight of a queued render and where they wait: path states, ray queues, paths waiting to be shaded.
+//
+// Properties and assumptions
+//   capacity   fixed at construction: `path_count` paths, each with the slots of its two rays (queues/treelet_queues.h).
+//   ownership  a path belongs to the thread that handles its last ray; a free path to nobody.
+//   threads    any number.
+#pragma once
+
+#include <memory>
+
+#include "engine/path_state.h"
+#include "queues/path_lists.h"
+#include "queues/treelet_queues.h"
+
+namespace shoal {
+
+class QueuedPaths {
+ public:
+  QueuedPaths(uint32_t treelet_count, uint32_t path_count, unsigned threads)
+      : rays(treelet_count, path_count, threads),
+        to_shade(treelet_count, path_count),
+        states_(std::make_unique<PathState[]>(path_count)),
+        path_count_(path_count) {}
+
+  static uint64_t bytes(uint32_t treelet_count, uint32_t path_count, unsigned threads) {
+    return uint64_t{path_count} * sizeof(PathState) + TreeletQueues::bytes(treelet_count, path_count, threads) +
+           PathLists::bytes(treelet_count, path_count);
+  }
+
+  PathState& state(uint32_t path) { return states_[path]; }
+  uint32_t path_count() const { return path_count_; }
+
+  /// Takes up to `wanted` free paths as a list linked by PathState::next_free; returns how many.
+  uint32_t take_free(uint32_t wanted, uint32_t* first) {
+    std::lock_guard guard(lock_);
+    uint32_t taken = 0;
+    *first = kNoIndex;
+    while (taken < wanted) {
+      uint32_t path = free_;
+      if (path != kNoIndex) {
+        free_ = states_[path].next_free;
+      } else if (untouched_ < path_count_) {
+        path = untouched_++;
+      } else {
+        break;
+      }
+      states_[path].next_free = *first;
+      *first = path;
+      ++taken;
+    }
+    free_count_.fetch_sub(taken, std::memory_order_relaxed);
+    return taken;
+  }
+  void give_back(uint32_t path) {
+    std::lock_guard guard(lock_);
+    states_[path].next_free = free_;
+    free_ = path;
+    free_count_.fetch_add(1, std::memory_order_relaxed);
+  }
+  uint32_t free_count() const {
+    const int64_t count = free_count_.load(std::memory_order_relaxed) + int64_t{path_count_};
+    return count > 0 ? static_cast<uint32_t>(count) : 0;
+  }
+
+  uint32_t waiting(TreeletId treelet) const { return rays.waiting(treelet) + to_shade.waiting(treelet); }
+
+  TreeletQueues rays;
+  PathLists to_shade;
+
+ private:
+  std::unique_ptr<PathState[]> states_;
+  uint32_t path_count_;
+  SpinLock lock_;
+  uint32_t free_ = kNoIndex;
+  uint32_t untouched_ = 0;
+  std::atomic<int64_t> free_count_{0};  ///< less path_count_
+};
+
+}  // namespace shoal

@@ -1,0 +1,92 @@
+#include "engine/render.h"
+
+#include <fmt/format.h>
+
+#include <thread>
+
+#include "engine/queued_paths.h"
+#include "engine/render_worker.h"
+
+namespace shoal {
+namespace {
+
+Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
+  if (picture.width == 0 || picture.height == 0 || picture.width > 65536 || picture.height > 65536 ||
+      uint64_t{picture.width} * picture.height >= (1ull << 31)) {
+    return Error{ErrorCode::kUsage, fmt::format("a picture of {} x {} pixels: each side must be 1 to 65536, the area "
+                                                "below 2^31", picture.width, picture.height)};
+  }
+  if (picture.samples == 0 || picture.samples > (1u << 22)) {
+    return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
+  }
+  const size_t cameras = std::max<size_t>(scene.cameras.size(), 1);
+  if (picture.camera >= cameras) {
+    return Error{ErrorCode::kUsage,
+                 fmt::format("camera {} was asked for, the scene has {}", picture.camera, scene.cameras.size())};
+  }
+  if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
+    return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}'", execution.policy)};
+  }
+  return {};
+}
+
+/// Treelet of every geometry page, so that eviction knows what waits for a page.
+std::vector<TreeletId> treelet_of_pages(const Scene& scene) {
+  std::vector<TreeletId> treelets(scene.file->page_count(), kNoIndex);
+  for (TreeletId id = 0; id < scene.treelets.size(); ++id) {
+    treelets[scene.treelets[id].geometry] = id;
+    if (scene.treelets[id].attributes != kNoPage) treelets[scene.treelets[id].attributes] = id;
+  }
+  return treelets;
+}
+
+}  // namespace
+
+Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
+                            const ExecutionOptions& asked, const RenderHooks& hooks) {
+  const double start = now_seconds();
+  SHOAL_RETURN_IF_ERROR(check_options(scene, picture, asked));
+  ExecutionOptions execution = asked;
+  if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
+  SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading));
+  SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, picture, execution));
+
+  const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera],
+                      picture.width, picture.height);
+  const SampleOrder samples(picture.width, picture.height, picture.samples);
+  Film film(picture.width, picture.height);
+  const bool queued = execution.order == Order::kQueued;
+  std::unique_ptr<QueuedPaths> paths;
+  WaitingWork waiting;
+  if (queued) {
+    paths = std::make_unique<QueuedPaths>(static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight,
+                                          execution.threads);
+    waiting = [&paths, treelets = treelet_of_pages(scene)](PageId page) -> uint64_t {
+      return treelets[page] == kNoIndex ? 0 : paths->waiting(treelets[page]);
+    };
+  }
+  PageCache cache(*scene.file, plan.cache_bytes,
+                  [](const PageRecord& record, std::span<const std::byte> bytes) { return check_page(record, bytes); },
+                  waiting);
+  RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
+  context.start_seconds = start;
+  if (queued) {
+    const std::unique_ptr<DrainPolicy> policy = make_drain_policy(execution.policy, execution.policy_options);
+    render_queued(context, *paths, *policy);
+  } else {
+    render_depth_first(context);
+  }
+  SHOAL_RETURN_IF_ERROR(context.error);
+  SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
+
+  RenderResult result;
+  result.rgba = film.resolve(picture.samples);
+  result.counters = context.counters;
+  result.plan = plan;
+  result.threads = execution.threads;
+  result.peak_cache_bytes = cache.peak_resident_bytes();
+  result.seconds = now_seconds() - start;
+  return result;
+}
+
+}  // namespace shoal

@@ -1,0 +1,178 @@
+// Queued: rays wait beside others that want the same treelet; a policy chooses the treelet, a thread takes it in hand,
+// shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new camera
+// samples are admitted as paths end.
+#include <thread>
+
+#include "engine/queued_paths.h"
+#include "engine/render_worker.h"
+
+namespace shoal {
+namespace {
+
+constexpr uint32_t kAdmitBatch = 1024;
+
+class Waiting final : public WaitingView {
+ public:
+  Waiting(const RenderContext& context, const QueuedPaths& paths) : context_(context), paths_(paths) {}
+  uint32_t treelet_count() const override { return paths_.rays.treelet_count(); }
+  uint32_t waiting(TreeletId treelet) const override { return paths_.waiting(treelet); }
+  bool resident(TreeletId treelet) const override {
+    return context_.cache.resident(context_.scene.treelets[treelet].geometry);
+  }
+
+ private:
+  const RenderContext& context_;
+  const QueuedPaths& paths_;
+};
+
+class QueuedWorker {
+ public:
+  QueuedWorker(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy, std::mutex& policy_mutex)
+      : context_(context), paths_(paths), policy_(policy), policy_mutex_(policy_mutex), worker_(context) {}
+
+  void run() {
+    while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.samples.count()) {
+      admit();
+      const TreeletId treelet = choose();
+      if (treelet != kNoIndex) {
+        drain(treelet);
+      } else if (!can_admit()) {
+        std::this_thread::yield();  // other threads have the last rays in hand
+      }
+      worker_.report_progress();
+    }
+    worker_.hand_in();
+  }
+
+ private:
+  bool can_admit() const {
+    return paths_.free_count() > 0 && context_.next_sample.load(std::memory_order_relaxed) < context_.samples.count();
+  }
+
+  TreeletId choose() {
+    std::lock_guard guard(policy_mutex_);
+    return policy_.choose(Waiting(context_, paths_), can_admit());
+  }
+
+  /// Begins new paths while there is room for a batch of them.
+  void admit() {
+    const uint32_t batch = std::min(kAdmitBatch, paths_.path_count());
+    while (paths_.free_count() >= batch || (can_admit() && paths_.free_count() == paths_.path_count())) {
+      if (!can_admit() || context_.ended.load(std::memory_order_relaxed)) return;
+      uint32_t path = kNoIndex;
+      const uint32_t taken = paths_.take_free(batch, &path);
+      if (taken == 0) return;
+      const uint64_t first = context_.next_sample.fetch_add(taken);
+      for (uint64_t index = first; index < first + taken; ++index) {
+        const uint32_t current = path;
+        path = paths_.state(current).next_free;
+        if (index < context_.samples.count()) {
+          rays_[0] = worker_.begin_path(index, current, paths_.state(current));
+          ray_count_ = 1;
+          handle_rays();
+        } else {
+          paths_.give_back(current);
+        }
+      }
+    }
+  }
+
+  void drain(TreeletId treelet) {
+    uint32_t path = paths_.to_shade.take(treelet);
+    RayBatch batch = paths_.rays.take(treelet);
+    if (!worker_.take_in_hand(treelet)) return;
+    while (path != kNoIndex && !context_.ended.load(std::memory_order_relaxed)) {
+      const uint32_t next = paths_.to_shade.next(path);
+      ray_count_ = 0;
+      vertex_ready(path);
+      handle_rays();
+      path = next;
+    }
+    while (const uint32_t count = batch.next_block(block_)) {
+      worker_.counters().ray_moved_bytes += count * sizeof(Ray);
+      for (uint32_t i = 0; i < count && !context_.ended.load(std::memory_order_relaxed); ++i) {
+        ++worker_.ray_counters(block_.rays[i]).rays_drained_count;
+        ray_count_ = 0;
+        cross_treelets(block_.rays[i]);
+        handle_rays();
+      }
+    }
+    worker_.let_go();
+  }
+
+  /// New rays of one path: at most two, each addressed and then traced here or queued.
+  void handle_rays() {
+    while (ray_count_ > 0) {
+      Ray ray = rays_[--ray_count_];
+      route(ray, worker_.next_treelet(ray));
+    }
+  }
+
+  /// The ray stands on an entry of the treelet in hand.
+  void cross_treelets(Ray& ray) {
+    worker_.trace(ray);
+    const TreeletId next = worker_.next_treelet(ray);
+    if (next != kNoIndex && next != worker_.in_hand()) ++worker_.ray_counters(ray).ray_exits_count;
+    route(ray, next);
+  }
+
+  /// Sends a ray on to `treelet`, through the treelet in hand at once, or notes its answer.
+  void route(Ray& ray, TreeletId treelet) {
+    while (treelet != kNoIndex && treelet == worker_.in_hand()) {
+      worker_.trace(ray);
+      treelet = worker_.next_treelet(ray);
+      if (treelet != kNoIndex && treelet != worker_.in_hand()) ++worker_.ray_counters(ray).ray_exits_count;
+    }
+    if (treelet != kNoIndex) {
+      ++worker_.ray_counters(ray).rays_queued_count;
+      worker_.counters().ray_moved_bytes += sizeof(Ray);
+      paths_.rays.push(treelet, ray);
+      return;
+    }
+    const uint32_t path = path_index_of(ray);
+    if (worker_.finish_ray(ray, paths_.state(path))) vertex_ready(path);
+  }
+
+  /// Both rays of the vertex are home: the path ends, is shaded here, or waits for its treelet.
+  void vertex_ready(uint32_t path_index) {
+    PathState& path = paths_.state(path_index);
+    if ((path.flags & kPathGoesOn) == 0) return end(path_index);
+    if (!path.hit.valid()) {
+      worker_.shade_miss(path);
+      return end(path_index);
+    }
+    if (path.hit.treelet != worker_.in_hand()) {
+      ++worker_.counters().paths_shaded_waiting_count;
+      paths_.to_shade.push(path.hit.treelet, path_index);
+      return;
+    }
+    ray_count_ = worker_.shade(path_index, path, rays_);
+    if (ray_count_ == 0) end(path_index);
+  }
+
+  void end(uint32_t path_index) {
+    worker_.end_path(paths_.state(path_index));
+    paths_.give_back(path_index);
+    ++context_.samples_done;
+  }
+
+  RenderContext& context_;
+  QueuedPaths& paths_;
+  DrainPolicy& policy_;
+  std::mutex& policy_mutex_;
+  RenderWorker worker_;
+  Ray rays_[2];             ///< of the path being handled
+  uint32_t ray_count_ = 0;
+  RayBlock block_;
+};
+
+}  // namespace
+
+void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy) {
+  std::mutex policy_mutex;
+  run_on_threads(context.threads, [&](unsigned) {
+    std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run();
+  });
+}
+
+}  // namespace shoal

@@ -1,0 +1,209 @@
+#include "engine/render_worker.h"
+
+#include <chrono>
+#include <cmath>
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace shoal {
+
+double now_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void RenderContext::fail(Error new_error) {
+  std::lock_guard guard(mutex);
+  if (error.ok()) error = std::move(new_error);
+  ended.store(true, std::memory_order_relaxed);
+}
+
+void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work) {
+  tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+  tbb::task_arena arena(static_cast<int>(threads));
+  arena.execute([&] {
+    tbb::parallel_for(0u, threads, work, tbb::simple_partitioner());
+  });
+}
+
+RenderWorker::RenderWorker(RenderContext& context)
+    : context_(context),
+      shader_(context.scene, context.tables, context.picture.shading, context.cache) {}
+
+Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
+  const PixelSample sample = context_.samples.at(index);
+  path.pixel = sample.y * context_.picture.width + sample.x;
+  path.sample = sample.sample;
+  path.bounce = 0;
+  path.flags = kPathGoesOn;
+  path.throughput = Vec3(1);
+  path.bsdf_pdf = 0;
+  path.radiance = Vec3(0);
+  path.shadow_radiance = Vec3(0);
+  const uint64_t seed = context_.picture.shading.seed;
+  const CameraRay camera_ray = context_.camera.ray(
+      sample.x, sample.y, random4(seed, path.pixel, path.sample, 0, Dimension::kPixel));
+  path.origin = camera_ray.origin;
+  path.direction = camera_ray.direction;
+  path.hit = Hit{};
+  path.pending.store(1, std::memory_order_relaxed);
+  ++counters_.samples_started_count;
+  counters_.path_state_moved_bytes += sizeof(PathState);
+  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false);
+  ++ray_counters(ray).rays_traced_count;
+  return ray;
+}
+
+void RenderWorker::trace(Ray& ray) {
+  RayCounters& rays = ray_counters(ray);
+  const uint64_t nodes = trace_counters_.node_tests_count, triangles = trace_counters_.triangle_tests_count;
+  trace_treelet(geometry_.bytes(), context_.scene.top_tree.current(ray),
+                context_.scene.top_tree.instance(ray.instance), ray, trace_counters_);
+  rays.node_tests_count += trace_counters_.node_tests_count - nodes;
+  rays.triangle_tests_count += trace_counters_.triangle_tests_count - triangles;
+  ++counters_.treelet_visits_count;
+}
+
+TreeletId RenderWorker::next_treelet(Ray& ray) {
+  if (ray.any_hit() && ray.hit.valid()) return kNoIndex;
+  const uint32_t entry = context_.scene.top_tree.next(ray, ray_counters(ray).node_tests_count);
+  return entry == kNoIndex ? kNoIndex : context_.scene.top_tree.entry(entry).treelet;
+}
+
+bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
+  RayCounters& rays = ray_counters(ray);
+  ++rays.rays_finished_count;
+  ++(ray.hit.valid() ? rays.ray_hits_count : rays.ray_misses_count);
+  counters_.path_state_moved_bytes += sizeof(PathState);
+  if (ray.any_hit()) {
+    if (!ray.hit.valid()) path.radiance += path.shadow_radiance;
+  } else {
+    path.hit = ray.hit;
+    path.t = ray.t;
+    if (path.bounce == 0 && ray.hit.valid()) path.flags |= kPathCovered;
+  }
+  return path.pending.fetch_sub(1, std::memory_order_acq_rel) == 1;
+}
+
+uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) {
+  if (!pin_attributes()) return 0;
+  const uint32_t bounce_before = path.bounce;
+  ShadeResult result;
+  Status status = shader_.shade_hit(path, geometry_.bytes(), attributes_.bytes(), result, shade_counters_,
+                                    cache_counters_);
+  if (!status.ok()) {
+    context_.fail(std::move(status).error());
+    return 0;
+  }
+  counters_.path_state_moved_bytes += sizeof(PathState);
+  const uint64_t seed = context_.picture.shading.seed;
+  uint32_t count = 0;
+  if (result.has_shadow) {
+    const uint32_t bounce_after = path.bounce;
+    path.bounce = bounce_before;  // the shadow ray belongs to the vertex that it leaves
+    rays[count++] = make_ray(path_index, path, seed, result.shadow_origin, result.shadow_direction,
+                             result.shadow_t_max, true);
+    path.bounce = bounce_after;
+  }
+  path.flags &= ~uint32_t{kPathGoesOn};
+  if (result.has_bounce) {
+    path.flags |= kPathGoesOn;
+    path.origin = result.bounce_origin;
+    path.direction = result.bounce_direction;
+    path.hit = Hit{};
+    rays[count++] = make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false);
+  }
+  for (uint32_t i = 0; i < count; ++i) ++ray_counters(rays[i]).rays_traced_count;
+  path.pending.store(count, std::memory_order_relaxed);
+  return count;
+}
+
+void RenderWorker::shade_miss(PathState& path) { shader_.shade_miss(path, shade_counters_); }
+
+void RenderWorker::end_path(const PathState& path) {
+  Vec3 radiance = path.radiance;
+  if (!std::isfinite(radiance.x) || !std::isfinite(radiance.y) || !std::isfinite(radiance.z)) {
+    radiance = Vec3(0);
+    ++counters_.invalid_samples_count;
+  }
+  if (!context_.film.add(path.pixel, radiance, (path.flags & kPathCovered) != 0)) ++counters_.film_saturated_count;
+  ++counters_.samples_committed_count;
+  counters_.path_state_moved_bytes += sizeof(PathState);
+}
+
+bool RenderWorker::take_in_hand(TreeletId treelet) {
+  if (treelet == in_hand_) return true;
+  let_go();
+  Result<PagePin> pin = context_.cache.pin(context_.scene.treelets[treelet].geometry, cache_counters_);
+  if (!pin.ok()) {
+    context_.fail(std::move(pin).error());
+    return false;
+  }
+  geometry_ = std::move(pin).value();
+  in_hand_ = treelet;
+  ++counters_.treelet_batches_count;
+  counters_.treelet_visit_bytes += geometry_.bytes().size();
+  return true;
+}
+
+void RenderWorker::let_go() {
+  geometry_.reset();
+  attributes_.reset();
+  in_hand_ = attributes_of_ = kNoIndex;
+}
+
+bool RenderWorker::pin_attributes() {
+  if (attributes_of_ == in_hand_) return true;
+  const PageId page = context_.scene.treelets[in_hand_].attributes;
+  attributes_.reset();
+  if (page != kNoPage) {
+    Result<PagePin> pin = context_.cache.pin(page, cache_counters_);
+    if (!pin.ok()) {
+      context_.fail(std::move(pin).error());
+      return false;
+    }
+    attributes_ = std::move(pin).value();
+  }
+  attributes_of_ = in_hand_;
+  return true;
+}
+
+void RenderWorker::report_progress() {
+  context_.disk_read_bytes += cache_counters_.disk_read_bytes - disk_bytes_reported_;
+  disk_bytes_reported_ = cache_counters_.disk_read_bytes;
+  if (context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed)) {
+    context_.fail({ErrorCode::kStopped, "the render was stopped before it was complete"});
+  }
+  if (!context_.hooks.progress) return;
+  const double now = now_seconds();
+  if (now < next_report_seconds_ || !context_.mutex.try_lock()) return;
+  next_report_seconds_ = now + 0.2;
+  std::lock_guard guard(context_.mutex, std::adopt_lock);
+  context_.hooks.progress({context_.samples_done, context_.samples.count(), context_.disk_read_bytes,
+                           now - context_.start_seconds});
+}
+
+void RenderWorker::hand_in() {
+  let_go();
+  RenderCounters& c = counters_;
+  c.page_requests_count = cache_counters_.page_requests_count;
+  c.page_hits_count = cache_counters_.page_hits_count;
+  c.page_misses_count = cache_counters_.page_misses_count;
+  c.page_evictions_count = cache_counters_.page_evictions_count;
+  c.disk_reads_count = cache_counters_.disk_reads_count;
+  c.disk_read_bytes = cache_counters_.disk_read_bytes;
+  c.decoded_bytes = cache_counters_.decoded_bytes;
+  c.treelet_loads_count = cache_counters_.treelet_loads_count;
+  c.treelet_load_bytes = cache_counters_.treelet_load_bytes;
+  c.attribute_loads_count = cache_counters_.attribute_loads_count;
+  c.texture_loads_count = cache_counters_.texture_loads_count;
+  c.coverage_tests_count = trace_counters_.coverage_tests_count;
+  c.vertices_shaded_count = shade_counters_.vertices_shaded_count;
+  c.texture_lookups_count = shade_counters_.texture_lookups_count;
+  c.invalid_samples_count += shade_counters_.invalid_samples_count;
+  std::lock_guard guard(context_.mutex);
+  context_.counters.add(c);
+}
+
+}  // namespace shoal

@@ -1,0 +1,105 @@
+// What a rendering thread does to a path in any order: beginning it, finishing its rays, shading its vertices, ending
+// it. The orders (render_depth_first, render_queued) decide only when and where. One worker a thread.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+
+#include "engine/camera.h"
+#include "engine/film.h"
+#include "engine/path_ray.h"
+#include "engine/render.h"
+#include "engine/sample_order.h"
+#include "io/page_cache.h"
+#include "treelets/trace_treelet.h"
+
+namespace shoal {
+
+/// Everything the threads of one render share.
+struct RenderContext {
+  const Scene& scene;
+  const PictureOptions& picture;
+  const ShadingTables& tables;
+  const Camera& camera;
+  const SampleOrder& samples;
+  const RenderHooks& hooks;
+  PageCache& cache;
+  Film& film;
+  unsigned threads;
+
+  std::atomic<uint64_t> next_sample{0};
+  std::atomic<uint64_t> samples_done{0};
+  std::atomic<uint64_t> disk_read_bytes{0};
+  std::atomic<bool> ended{false};  ///< an error or a stop: threads return soon
+  std::mutex mutex{};              ///< guards error and counters
+  Status error{};
+  RenderCounters counters{};
+  double start_seconds = 0;
+
+  void fail(Error error);
+};
+
+/// Seconds of a monotonic clock.
+double now_seconds();
+
+class RenderWorker {
+ public:
+  explicit RenderWorker(RenderContext& context);
+
+  /// Begins sample `index` in `path`; returns its camera ray.
+  Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
+
+  /// Traces the ray through the treelet in hand. Requires: the cursor stands on an entry of that treelet.
+  void trace(Ray& ray);
+  /// Next treelet of the ray, or kNoIndex when its answer is known.
+  TreeletId next_treelet(Ray& ray);
+
+  /// The ray's answer is known: notes it in its path. Returns true when it was the last ray of the vertex.
+  bool finish_ray(const Ray& ray, PathState& path);
+
+  /// Shades path.hit, which is in the treelet in hand. Writes the vertex's rays to `rays` and returns how many (0..2).
+  /// Sets path.pending and kPathGoesOn. After 0 the path is over.
+  uint32_t shade(uint32_t path_index, PathState& path, Ray rays[2]);
+  /// The camera or bounce ray left the scene.
+  void shade_miss(PathState& path);
+  /// Adds the path to the film.
+  void end_path(const PathState& path);
+
+  /// Pins the treelet; the one before is let go. Returns false on an error (context.ended is set).
+  bool take_in_hand(TreeletId treelet);
+  TreeletId in_hand() const { return in_hand_; }
+  void let_go();
+
+  RayCounters& ray_counters(const Ray& ray) {
+    return counters_.rays[static_cast<size_t>(kind_of(ray))][counted_bounce_of(ray)];
+  }
+  RenderCounters& counters() { return counters_; }
+  /// Calls the progress hook from the first thread now and then; sees stop requests.
+  void report_progress();
+  /// Adds this worker's counters to the context. Called once, at the end.
+  void hand_in();
+
+ private:
+  bool pin_attributes();
+
+  RenderContext& context_;
+  Shader shader_;
+  PagePin geometry_, attributes_;
+  TreeletId in_hand_ = kNoIndex;
+  TreeletId attributes_of_ = kNoIndex;
+  RenderCounters counters_;
+  CacheCounters cache_counters_;
+  TraceCounters trace_counters_;
+  ShadeCounters shade_counters_;
+  uint64_t disk_bytes_reported_ = 0;
+  double next_report_seconds_ = 0;
+};
+
+/// The two orders. Both return when every sample is in the film or context.ended is set.
+void render_depth_first(RenderContext& context);
+void render_queued(RenderContext& context, class QueuedPaths& paths, DrainPolicy& policy);
+
+/// Runs `work(thread index)` on `threads` threads of a oneTBB arena.
+void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work);
+
+}  // namespace shoal
