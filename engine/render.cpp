@@ -66,7 +66,9 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
     };
   }
   PageCache cache(*scene.file, plan.cache_bytes,
-                  [](const PageRecord& record, std::span<const std::byte> bytes) { return check_page(record, bytes); },
+                  [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
+                    return check_page(scene, record, bytes);
+                  },
                   waiting);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
