@@ -55,10 +55,12 @@ class PageFileWriter {
   PageFileWriter& operator=(PageFileWriter&&) noexcept;
   ~PageFileWriter();
 
-  /// Appends one page and returns its id (0, 1, 2, ... in order of appending). Compresses with lz4 and keeps
-  /// the smaller. Requires: 0 < bytes.size() <= kMaxPageBytes. Fails with: kStorage.
+  /// Appends one page and returns its id (0, 1, 2, ... in order of appending). Compresses with lz4, and keeps that
+  /// where it takes fewer 4 KiB blocks. A writer that failed stays failed.
+  /// Requires: kind is not kTable, 0 < bytes.size() <= kMaxPageBytes. Fails with: kStorage.
   Result<PageId> append(PageKind kind, std::span<const std::byte> bytes);
-  /// Stores a table (possibly empty) as consecutive pages. Requires: each TableId at most once.
+  /// Stores a table as consecutive pages; an empty one as a single page of no bytes, so that it is not absent.
+  /// Requires: each TableId at most once.
   Status append_table(TableId table, std::span<const std::byte> bytes);
   uint64_t bytes_written() const;
   uint32_t page_count() const;
@@ -71,16 +73,20 @@ class PageFileWriter {
   std::unique_ptr<State> state_;
 };
 
+struct TableRange;
+
 class PageFile {
  public:
   /// Reads superblock, footer and directory, and checks them (checksums, ranges, order, no overlap).
-  /// Fails with: kInput (missing), kCorrupt (file, offset, expected, found).
+  /// Fails with: kInput (missing, not a .shoal file, another version), kCorrupt (file, offset, expected, found).
   static Result<std::unique_ptr<PageFile>> open(FileSystem& fs, const std::string& path, ReadMode mode);
+  ~PageFile();
 
   const std::string& path() const { return path_; }
   uint64_t file_bytes() const { return file_bytes_; }
   std::span<const PageRecord> records() const { return records_; }
   uint32_t page_count() const { return static_cast<uint32_t>(records_.size()); }
+  /// Requires: id < page_count().
   const PageRecord& record(PageId id) const { return records_[id]; }
 
   /// Reads, verifies and decodes one page into `out` (exactly record(id).raw_bytes long). Sets
@@ -90,14 +96,17 @@ class PageFile {
   /// than `limit_bytes`.
   Result<std::vector<std::byte>> read_table(TableId table, uint64_t limit_bytes) const;
   bool has_table(TableId table) const;
-  /// Reads every byte of the file: checksums, padding that must be zero, gaps. Fails with: kCorrupt.
+  /// Reads every byte of the file: checksums, padding that must be zero, gaps. Stops at the first damage.
+  /// Fails with: kStorage, kCorrupt.
   Status verify() const;
 
  private:
-  PageFile() = default;
+  PageFile();
+  const TableRange* find_table(TableId table) const;
   std::string path_;
   uint64_t file_bytes_ = 0;
   std::vector<PageRecord> records_;
+  std::vector<TableRange> tables_;
   std::unique_ptr<ReadableFile> file_;
 };
 

@@ -1,0 +1,96 @@
+#include "tests/support/faulty_file_system.h"
+
+namespace shoal {
+namespace {
+
+Error failure(Fault fault, const std::string& path) {
+  return {ErrorCode::kStorage, path + (fault == Fault::kDiskFull ? ": disk full" : ": Input/output error")};
+}
+
+}  // namespace
+
+void FaultyFileSystem::arm(Fault fault, uint64_t call, bool lasting) {
+  fault_ = fault;
+  at_call_ = call;
+  lasting_ = lasting;
+  calls_ = 0;
+}
+
+Fault FaultyFileSystem::next(Call call) {
+  const Fault fault = fault_;
+  bool applies = false;
+  switch (fault) {
+    case Fault::kNone: break;
+    case Fault::kIoError: applies = true; break;
+    case Fault::kDiskFull: applies = call == Call::kCreate || call == Call::kWrite || call == Call::kSync; break;
+    case Fault::kShortRead:
+    case Fault::kBitFlip: applies = call == Call::kRead; break;
+  }
+  if (!applies) return Fault::kNone;
+  const uint64_t number = calls_.fetch_add(1);
+  return number == at_call_ || (lasting_ && number > at_call_) ? fault : Fault::kNone;
+}
+
+class FaultyFileSystem::Reader final : public ReadableFile {
+ public:
+  Reader(FaultyFileSystem& fs, std::unique_ptr<ReadableFile> base) : fs_(fs), base_(std::move(base)) {}
+
+  Status read_at(uint64_t offset, std::span<std::byte> out) override {
+    const Fault fault = fs_.next(Call::kRead);
+    if (fault == Fault::kIoError) return failure(fault, path());
+    if (fault == Fault::kShortRead) {
+      SHOAL_RETURN_IF_ERROR(base_->read_at(offset, out.first(out.size() / 2)));
+      return Error{ErrorCode::kStorage, path() + ": short read"};
+    }
+    SHOAL_RETURN_IF_ERROR(base_->read_at(offset, out));
+    if (fault == Fault::kBitFlip && !out.empty()) out[out.size() / 3] ^= std::byte{0x10};
+    return {};
+  }
+  uint64_t size_bytes() const override { return base_->size_bytes(); }
+  const std::string& path() const override { return base_->path(); }
+
+ private:
+  FaultyFileSystem& fs_;
+  const std::unique_ptr<ReadableFile> base_;
+};
+
+class FaultyFileSystem::Writer final : public WritableFile {
+ public:
+  Writer(FaultyFileSystem& fs, std::unique_ptr<WritableFile> base) : fs_(fs), base_(std::move(base)) {}
+
+  Status write_at(uint64_t offset, std::span<const std::byte> bytes) override {
+    const Fault fault = fs_.next(Call::kWrite);
+    if (fault == Fault::kNone) return base_->write_at(offset, bytes);
+    SHOAL_RETURN_IF_ERROR(base_->write_at(offset, bytes.first(bytes.size() / 2)));
+    return failure(fault, path());
+  }
+  Status sync() override {
+    const Fault fault = fs_.next(Call::kSync);
+    if (fault != Fault::kNone) return failure(fault, path());
+    return base_->sync();
+  }
+  const std::string& path() const override { return base_->path(); }
+
+ private:
+  FaultyFileSystem& fs_;
+  const std::unique_ptr<WritableFile> base_;
+};
+
+Result<std::unique_ptr<ReadableFile>> FaultyFileSystem::open(const std::string& path, ReadMode mode) {
+  if (const Fault fault = next(Call::kOpen); fault != Fault::kNone) return failure(fault, path);
+  SHOAL_ASSIGN_OR_RETURN(auto file, base_.open(path, mode));
+  return std::unique_ptr<ReadableFile>(std::make_unique<Reader>(*this, std::move(file)));
+}
+
+Result<std::unique_ptr<WritableFile>> FaultyFileSystem::create(const std::string& path) {
+  if (const Fault fault = next(Call::kCreate); fault != Fault::kNone) return failure(fault, path);
+  SHOAL_ASSIGN_OR_RETURN(auto file, base_.create(path));
+  return std::unique_ptr<WritableFile>(std::make_unique<Writer>(*this, std::move(file)));
+}
+
+Status FaultyFileSystem::rename(const std::string& from, const std::string& to) {
+  if (const Fault fault = next(Call::kRename); fault != Fault::kNone) return failure(fault, from);
+  return base_.rename(from, to);
+}
+
+}  // namespace shoal

@@ -1,0 +1,49 @@
+// A FileSystem that fails on purpose: it passes calls on to another one, and harms the n-th call that the chosen fault
+// applies to. remove() is never harmed: it is how the code under test cleans up. Thread rule: any number of threads.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "io/file.h"
+
+namespace shoal {
+
+enum class Fault {
+  kNone,
+  kIoError,    ///< any call: fails with EIO; a write leaves half of its bytes behind
+  kDiskFull,   ///< create, write, sync: fails with ENOSPC; a write leaves half of its bytes behind
+  kShortRead,  ///< read: fills half and fails
+  kBitFlip,    ///< read: one bit of what comes back is wrong, and nobody says so
+};
+
+class FaultyFileSystem final : public FileSystem {
+ public:
+  explicit FaultyFileSystem(FileSystem& base) : base_(base) {}
+
+  /// Harms the call number `call` (from 0) among those the fault applies to, counted from now; with `lasting`
+  /// all later ones too.
+  void arm(Fault fault, uint64_t call, bool lasting = false);
+  /// Calls that the armed fault could have harmed so far.
+  uint64_t calls() const { return calls_.load(); }
+
+  Result<std::unique_ptr<ReadableFile>> open(const std::string& path, ReadMode mode) override;
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override;
+  Status rename(const std::string& from, const std::string& to) override;
+  Status remove(const std::string& path) override { return base_.remove(path); }
+
+ private:
+  class Reader;
+  class Writer;
+  enum class Call { kOpen, kCreate, kRead, kWrite, kSync, kRename };
+  /// The fault to do to this call, or kNone.
+  Fault next(Call call);
+
+  FileSystem& base_;
+  std::atomic<Fault> fault_{Fault::kNone};
+  std::atomic<uint64_t> at_call_{0};
+  std::atomic<uint64_t> calls_{0};
+  std::atomic<bool> lasting_{false};
+};
+
+}  // namespace shoal
