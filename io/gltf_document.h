@@ -20,6 +20,7 @@ namespace shoal::gltf {
 /// Budgets against hostile input; over a budget is ErrorCode::kInput.
 struct Limits {
   uint64_t json_bytes = 1ull << 30;
+  uint64_t json_values_count = 1ull << 26;  ///< of the whole document
   uint64_t objects_count = 1ull << 24;      ///< of each array of the document
   uint32_t node_depth = 512;
   uint64_t instances_count = 1ull << 24;    ///< nodes with meshes, after flattening

@@ -1,0 +1,33 @@
+// The sections of a glTF document, each read from JSON into the plain structs of gltf_document.h. Errors stick to
+// the JsonText (see gltf_json.h); the caller asks once. Later sections rely on earlier ones: call in this order.
+// Called by load_document() only.
+#pragma once
+
+#include <optional>
+
+#include "io/glb.h"
+#include "io/gltf_document.h"
+#include "io/gltf_json.h"
+
+namespace shoal::gltf {
+
+/// extensionsUsed and extensionsRequired, and a warning for each that is used and not read.
+void read_extensions(const JsonNode& root, const Limits& limits, Document& document);
+/// Fails with: kUnsupported.
+Status check_required_extensions(const Document& document);
+
+/// `binary` is the BIN chunk of a .glb.
+void read_buffers(const JsonNode& root, const std::optional<FileRange>& binary, const Limits& limits,
+                  Document& document);
+void read_accessors(const JsonNode& root, const Limits& limits, Document& document);
+void read_textures(const JsonNode& root, const Limits& limits, Document& document);
+void read_materials(const JsonNode& root, const Limits& limits, Document& document);
+void read_meshes(const JsonNode& root, const Limits& limits, Document& document);
+void read_cameras_and_lights(const JsonNode& root, const Limits& limits, Document& document);
+/// Nodes and the roots of the default scene; checks that they are a forest.
+void read_nodes(const JsonNode& root, const Limits& limits, Document& document);
+
+/// Bytes of one element, with the padding of matrix columns to 4 bytes (glTF 2.0, section 3.6.2.4).
+uint64_t element_bytes(const Accessor& accessor);
+
+}  // namespace shoal::gltf
