@@ -10,9 +10,13 @@
 
 #include "engine/path_state.h"
 #include "engine/scene.h"
+#include "engine/texture_sample.h"
 #include "io/page_cache.h"
 
 namespace shoal {
+
+class Bsdf;
+struct Surface;
 
 /// --environment: constant radiance or an equirectangular picture (glTF axes: +y up; u = 0.5 looks along -z).
 struct EnvironmentOptions {
@@ -22,8 +26,10 @@ struct EnvironmentOptions {
 };
 
 struct ShadingOptions {
-  uint32_t bounces = 8;         ///< path vertices after the first that may be shaded; 0: direct light only
-  uint32_t roulette_start = 3;  ///< the first bounce at which Russian roulette may end a path
+  /// Scattering events a path may have. Vertex k (PathState::bounce == k; the camera ray's hit is 0) sends a shadow ray
+  /// and a bounce only when k < bounces. 0: emission seen by the camera; 1: direct light; 2: one indirect bounce.
+  uint32_t bounces = 8;
+  uint32_t roulette_start = 3;  ///< the first vertex at which Russian roulette may end a path
   uint64_t seed = 0;
   EnvironmentOptions environment;
 };
@@ -63,7 +69,7 @@ struct ShadeCounters {
 
 class Shader {
  public:
-  /// `cache` serves texture tiles; at most one is pinned at a time.
+  /// Keeps references to all four. `cache` serves texture tiles; at most one is pinned at a time.
   Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache);
 
   /// Shades path.hit. Requires: path.hit.valid(), both rays of the vertex before are home. `geometry` is the hit
@@ -76,11 +82,16 @@ class Shader {
   void shade_miss(PathState& path, ShadeCounters& counters);
 
  private:
+  Status add_emission(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
+                      CacheCounters& cache_counters);
+  Status sample_light(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result,
+                      ShadeCounters& counters, CacheCounters& cache_counters);
+  void sample_bounce(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result) const;
+
   const Scene* scene_;
   const ShadingTables* tables_;
   const ShadingOptions* options_;
-  PageCache* cache_;
-  PagePin tile_;  ///< the texture tile read last
+  TextureSampler textures_;
 };
 
 }  // namespace shoal

@@ -15,6 +15,7 @@
 #include <span>
 #include <vector>
 
+#include "io/result.h"
 #include "treelets/ray.h"
 #include "treelets/vector.h"
 

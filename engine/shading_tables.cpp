@@ -1,0 +1,41 @@
+#include "engine/shading_tables.h"
+
+namespace shoal {
+namespace {
+
+bool has_specular_lobe(const Material& material) { return material.metallic > 0 || material.specular > 0; }
+
+}  // namespace
+
+ShadingTables::ShadingTables(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ShadingTables::~ShadingTables() = default;
+
+Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, const Scene& scene,
+                                                             const ShadingOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  switch (options.environment.kind) {
+    case EnvironmentOptions::Kind::kNone: break;
+    case EnvironmentOptions::Kind::kConstant: impl->environment = Environment(options.environment.radiance); break;
+    case EnvironmentOptions::Kind::kImage: {
+      SHOAL_ASSIGN_OR_RETURN(ImageF image, read_hdr_image(fs, options.environment.path, kMaxEnvironmentPixels));
+      impl->environment = Environment(std::move(image));
+      break;
+    }
+  }
+  impl->lights.emplace(scene, impl->environment);
+  impl->lights_hit_by_chance = !impl->environment.black();
+  for (const Material& material : scene.materials) {
+    if ((material.flags & kMaterialEmits) != 0) impl->lights_hit_by_chance = true;
+    if (has_specular_lobe(material) && !impl->energy) impl->energy.emplace();
+  }
+  return std::unique_ptr<ShadingTables>(new ShadingTables(std::move(impl)));
+}
+
+uint64_t ShadingTables::resident_bytes() const {
+  return sizeof(Impl) + impl_->environment.resident_bytes() + impl_->lights->resident_bytes() +
+         (impl_->energy ? impl_->energy->resident_bytes() : 0);
+}
+
+bool ShadingTables::has_lights() const { return !impl_->lights->empty(); }
+
+}  // namespace shoal
