@@ -2,8 +2,8 @@
 // written to a block and be taken up by any thread. What the integrator needs meanwhile is in engine/path_state.h.
 //
 // The traversal state is a cursor into the resident top tree (treelets/top_tree.h): the child it took last. At
-// every node children are entered in the order (t of entry, slot), which depends on ray and node only, so
-// the cursor alone says what has been visited; parents are found through links in the nodes. `more_` is a
+// every node children are entered in the order (t of entry less its last three bits, slot), which depends on ray and
+// node only, so the cursor alone says what has been visited; parents are found through links in the nodes. `more` is a
 // cache over it: bit L says whether the node at level L still had children to enter, so that a test of its
 // boxes can be left out on the way up. Any number of its bits may be missing (TraversalOptions::more_levels).
 #pragma once

@@ -9,6 +9,9 @@
 //
 // Boxes: lo/hi are the children's bounds in float. The test (treelets/box_test.h) widens the ray by
 // RaySpace::pad, so that whatever the triangle test accepts, every box above it accepts.
+//
+// At every node the children that the ray enters are taken in the order of entry_key() (treelets/box_test.h: t of entry
+// without its last three bits, then slot), which depends on ray and node alone.
 #pragma once
 
 #include <cstdint>
@@ -58,6 +61,8 @@ struct TraversalOptions {
   uint32_t more_levels = 32;  ///< levels for which Ray::more is used, 0..32; less is slower, never different
 };
 
+struct RayContext;  // treelets/ray_space.h
+
 class TopTree {
  public:
   TopTree() = default;
@@ -70,8 +75,11 @@ class TopTree {
                       std::span<const Instance> instances, uint32_t treelet_count);
 
   /// Moves the ray's cursor to the next treelet entry whose box the ray enters at or before ray.t, and
-  /// returns the entry's index, or kNoIndex when there is none. `box_tests` counts nodes tested.
+  /// returns the entry's index, or kNoIndex when there is none (the cursor is then as before the start).
+  /// `node_tests` counts nodes tested.
   uint32_t next(Ray& ray, uint64_t& node_tests) const;
+  /// The same for a worker that keeps `context` while it has this ray in hand: saves transforms and reciprocals.
+  uint32_t next(Ray& ray, RayContext& context, uint64_t& node_tests) const;
 
   const TreeletEntry& entry(uint32_t index) const { return entries_[index]; }
   /// The entry a ray's cursor stands on. Requires: next() returned one for this ray.
@@ -91,8 +99,9 @@ class TopTree {
   std::vector<TreeletEntry> entries_;
   std::vector<Instance> instances_;
   TraversalOptions options_;
-  float world_pad_scale_ = 0;   ///< see ray_space.h
-  float world_max_abs_ = 0;
+  float world_pad_scale_ = 0;    ///< kWorldPad times the largest transform_error; see ray_space.h
+  float world_extent_ = 0;       ///< E of ray_space.h, the largest of all instances
+  bool single_identity_ = false; ///< one instance whose space is the world: its tree is entered at once
 };
 
 }  // namespace shoal

@@ -22,13 +22,19 @@ struct TraceCounters {
 /// Crosses treelet `treelet` (its decoded geometry page) from `entry.root` in the space of `instance`.
 /// Closest hit: ray.t and ray.hit become the smallest (t, instance, primitive) so far.
 /// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
-/// Requires: the page passed check_treelet().
+/// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the page
+/// (as in PagePin::bytes), `instance` is the one that ray.instance names.
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
                    TraceCounters& counters);
+/// The same for a worker that keeps `context` while it has this ray in hand (treelets/ray_space.h).
+void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
+                   RayContext& context, TraceCounters& counters);
 
 /// Checks every offset and count of a geometry page from a file, so that trace_treelet and find_triangle cannot
 /// read outside it or loop. Run once when a page is decoded. Fails with: kCorrupt.
 Status check_treelet(std::span<const std::byte> page);
+/// Checks that a TreeletEntry's root lies in the page. Requires: the page passed check_treelet(). Fails with: kCorrupt.
+Status check_root(std::span<const std::byte> page, uint32_t root);
 
 /// One triangle of a treelet by Hit::slot, for shading.
 struct TreeletTriangle {

@@ -1,0 +1,186 @@
+// The heart of the floor: traversal through top tree and treelets gives, bit for bit, what testing every triangle gives.
+#include <gtest/gtest.h>
+
+#include "tests/support/hand_made_scene.h"
+#include "treelets/trace_treelet_scalar.h"
+
+namespace shoal::testing {
+namespace {
+
+/// Rays of every awkward sort at a scene about [-1, 1]^3 in size.
+std::vector<Ray> awkward_rays(std::mt19937& random, const std::vector<TestTriangle>& triangles, size_t count) {
+  std::vector<Ray> rays;
+  std::uniform_real_distribution<float> uniform(0, 1);
+  while (rays.size() < count) {
+    const TestTriangle& aim = triangles[random() % triangles.size()];
+    Vec3 origin = random_vector(random, 2), direction = random_vector(random);
+    switch (rays.size() % 10) {
+      case 0:
+        break;
+      case 1:  // along an axis
+        direction = Vec3(0), direction[static_cast<int>(random() % 3)] = random() % 2 ? 1.0f : -1.0f;
+        origin = aim.p[0] - direction * 3.0f;
+        break;
+      case 2:  // at a vertex
+        direction = aim.p[random() % 3] - origin;
+        break;
+      case 3:  // at an edge
+        direction = aim.p[0] + (aim.p[1] - aim.p[0]) * uniform(random) - origin;
+        break;
+      case 4:  // in the plane of a triangle
+        origin = aim.p[0] + (aim.p[1] - aim.p[0]) * 3.0f;
+        direction = aim.p[2] + (aim.p[1] - aim.p[2]) * uniform(random) - origin;
+        break;
+      case 5:  // from far away
+        origin = direction * 1e4f;
+        direction = aim.p[0] * uniform(random) - origin;
+        break;
+      case 6:  // one component zero
+        direction = aim.p[0] - origin, direction[static_cast<int>(random() % 3)] = random() % 2 ? 0.0f : -0.0f;
+        break;
+      case 7:  // huge
+        direction *= 1e30f;
+        break;
+      case 8:  // denormal components
+        direction = aim.p[0] - origin, direction[static_cast<int>(random() % 3)] = 1e-41f;
+        break;
+      case 9:  // from a vertex
+        origin = aim.p[0];
+        break;
+    }
+    rays.push_back(make_ray(origin, direction, kRayInfinity, random() % 4 == 0));
+    rays.back().alpha_seed = static_cast<uint32_t>(random());
+  }
+  return rays;
+}
+
+void expect_same(const Ray& expected, const Ray& found, size_t index) {
+  ASSERT_EQ(expected.hit.valid(), found.hit.valid()) << "ray " << index;
+  if (expected.any_hit() || !expected.hit.valid()) return;
+  ASSERT_EQ(expected.t, found.t) << "ray " << index;
+  ASSERT_EQ(expected.hit.instance, found.hit.instance) << "ray " << index;
+  ASSERT_EQ(expected.hit.primitive, found.hit.primitive) << "ray " << index;
+}
+
+/// Scene by scene, ray by ray, for the product's kernel and the scalar reference. Returns the number of hits.
+size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t more_levels = 32) {
+  EXPECT_TRUE(TopTree::check(scene.nodes, scene.entries, scene.instances, static_cast<uint32_t>(scene.pages.size())).ok());
+  const TopTree tree(scene.nodes, scene.entries, scene.instances, {more_levels});
+  for (const AlignedPage& page : scene.pages) EXPECT_TRUE(check_treelet(page.bytes()).ok());
+  size_t hits = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    Ray expected = rays[i], scalar = rays[i], found = rays[i];
+    brute_force(scene, expected);
+    trace_scene(tree, scene.pages, scalar, trace_treelet_scalar);
+    trace_scene(tree, scene.pages, found, trace_treelet);
+    expect_same(expected, scalar, i);
+    expect_same(expected, found, i);
+    EXPECT_EQ(std::memcmp(&scalar, &found, sizeof(Ray)), 0) << "ray " << i;
+    if (::testing::Test::HasFatalFailure()) return hits;
+    hits += expected.hit.valid();
+  }
+  return hits;
+}
+
+TEST(Trace, FindsWhatBruteForceFindsInASoup) {
+  std::mt19937 random(1);
+  const auto soup = random_soup(random, 2000, 0.1f);
+  for (const TestSceneOptions options : {TestSceneOptions{5000, 4}, {200, 4}, {20, 8}, {7, 1}, {200, 3, true}}) {
+    const TestScene scene = make_scene({soup}, {{0, {}}}, options);
+    EXPECT_GT(compare(scene, awkward_rays(random, soup, 2000)), 700u);
+  }
+}
+
+TEST(Trace, FindsWhatBruteForceFindsInAMesh) {
+  std::mt19937 random(2);
+  const auto mesh = closed_mesh(20, 40, 0.2f);
+  for (const TestSceneOptions options : {TestSceneOptions{100, 4}, {1000, 8}, {50, 2, true}}) {
+    const TestScene scene = make_scene({mesh}, {{0, {}}}, options);
+    EXPECT_GT(compare(scene, awkward_rays(random, mesh, 2000)), 700u);
+  }
+}
+
+TEST(Trace, FindsWhatBruteForceFindsInAxisAlignedGrids) {
+  std::mt19937 random(3);
+  std::vector<TestTriangle> grid;  // planes of squares: flat boxes, planes shared by many boxes
+  for (int x = -8; x < 8; ++x) {
+    for (int y = -8; y < 8; ++y) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto corner = [&](int i, int j) {
+          const float v[3] = {(x + i) * 0.125f, (y + j) * 0.125f, 0.25f * static_cast<float>(axis)};
+          return Vec3(v[axis], v[(axis + 1) % 3], v[(axis + 2) % 3]);
+        };
+        const uint32_t id = static_cast<uint32_t>(grid.size());
+        grid.push_back({{corner(0, 0), corner(1, 0), corner(0, 1)}, id});
+        grid.push_back({{corner(1, 0), corner(1, 1), corner(0, 1)}, id + 1});
+      }
+    }
+  }
+  for (const TestSceneOptions options : {TestSceneOptions{100, 4}, {2000, 8}, {50, 2, true}}) {
+    const TestScene scene = make_scene({grid}, {{0, {}}}, options);
+    EXPECT_GT(compare(scene, awkward_rays(random, grid, 2000)), 700u);
+  }
+}
+
+TEST(Trace, FindsWhatBruteForceFindsAmongInstances) {
+  std::mt19937 random(4);
+  const auto soup = random_soup(random, 300, 0.3f);
+  const auto mesh = closed_mesh(10, 16, 0.2f, 300);
+  std::vector<Placement> placements{{0, {}}};
+  for (int i = 0; i < 30; ++i) {  // rotated, scaled, sheared, mirrored
+    Placement p;
+    p.object = random() % 2;
+    p.object_to_world.column_x = random_vector(random);
+    p.object_to_world.column_y = random_vector(random);
+    p.object_to_world.column_z = random_vector(random, i % 7 == 0 ? 0.01f : 1.0f);
+    p.object_to_world.translation = random_vector(random, i % 5 == 0 ? 50.0f : 2.0f);
+    placements.push_back(p);
+  }
+  for (const uint32_t more_levels : {32u, 2u, 0u}) {
+    for (const TestSceneOptions options : {TestSceneOptions{50, 4}, {1000, 8, true}}) {
+      const TestScene scene = make_scene({soup, mesh}, placements, options);
+      EXPECT_GT(compare(scene, awkward_rays(random, soup, 500), more_levels), 150u);
+    }
+  }
+}
+
+TEST(Trace, ScalesOfCoordinatesDoNotMatter) {
+  std::mt19937 random(5);
+  for (const float scale : {1e-30f, 1e-10f, 1e10f, 1e18f}) {
+    auto soup = random_soup(random, 500, 0.2f);
+    auto rays = awkward_rays(random, soup, 500);
+    for (auto& t : soup) {
+      for (auto& p : t.p) p *= scale;
+    }
+    for (auto& r : rays) r.origin *= scale;
+    compare(make_scene({soup}, {{0, {}}}, {50, 4}), rays);
+  }
+}
+
+TEST(Trace, DuplicatesResolveToTheSmallestId) {
+  std::mt19937 random(6);
+  auto soup = random_soup(random, 50, 0.5f);
+  const std::vector<TestTriangle> original = soup;
+  for (int copy = 1; copy < 5; ++copy) {
+    for (TestTriangle t : original) {
+      t.primitive += static_cast<uint32_t>(50 * copy);
+      soup.push_back(t);
+    }
+  }
+  std::shuffle(soup.begin(), soup.end(), random);
+  const TestScene scene = make_scene({soup}, {{0, {}}, {0, {}}}, {20, 3});
+  const TopTree tree(scene.nodes, scene.entries, scene.instances);
+  size_t hits = 0;
+  for (Ray ray : awkward_rays(random, soup, 2000)) {
+    ray.path = 0;
+    trace_scene(tree, scene.pages, ray, trace_treelet);
+    if (!ray.hit.valid()) continue;
+    ++hits;
+    EXPECT_EQ(ray.hit.instance, 0u);
+    EXPECT_LT(ray.hit.primitive, 50u);
+  }
+  EXPECT_GT(hits, 300u);
+}
+
+}  // namespace
+}  // namespace shoal::testing

@@ -1,0 +1,50 @@
+#include "treelets/trace_treelet_scalar.h"
+
+#include "treelets/leaf_test.h"
+#include "treelets/traversal_stack.h"
+
+namespace shoal {
+namespace {
+
+uint32_t cross_node(const RaySpace& space, const QuantizedNode& node, float t, uint32_t keys[8]) {
+  uint32_t mask = 0;
+  float step[3];
+  for (int axis = 0; axis < 3; ++axis) step[axis] = power_of_two(node.exponent[axis]);
+  for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+    float lo[3], hi[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      lo[axis] = dequantize(node.origin[axis], step[axis], node.lo[axis][slot]);
+      hi[axis] = dequantize(node.origin[axis], step[axis], node.hi[axis][slot]);
+    }
+    const BoxSpan span = cross_box(space, lo, hi);
+    keys[slot] = entry_key(span.t_near, slot);
+    if (span.entered(t)) mask |= 1u << slot;
+  }
+  return mask;
+}
+
+}  // namespace
+
+void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
+                          Ray& ray, TraceCounters& counters) {
+  const TreeletView treelet(page);
+  const RaySpace space = to_object_space(ray, instance);
+  TraversalStack stack;
+  NodeRef ref = entry.root;
+  do {
+    if (is_leaf(ref)) {
+      const LeafView leaf = treelet.leaf(leaf_offset(ref));
+      counters.triangle_tests_count += leaf.header->triangle_count;
+      for (uint32_t i = 0; i < leaf.header->triangle_count; ++i) {
+        if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, entry, ray, counters)) return;
+      }
+    } else {
+      ++counters.node_tests_count;
+      const QuantizedNode& node = treelet.nodes[ref];
+      uint32_t keys[8];
+      stack.push(keys, node.child, cross_node(space, node, ray.t, keys));
+    }
+  } while (stack.pop(ray.t, ref));
+}
+
+}  // namespace shoal
