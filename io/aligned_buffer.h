@@ -17,7 +17,9 @@ namespace shoal {
 inline constexpr uint64_t kBlockBytes = 4096;
 
 /// Requires: value <= 2^64 - alignment, alignment a power of two.
-constexpr uint64_t align_up(uint64_t value, uint64_t alignment) { return (value + alignment - 1) & ~(alignment - 1); }
+constexpr uint64_t align_up(uint64_t value, uint64_t alignment) {
+  return (value + alignment - 1) & ~(alignment - 1);
+}
 constexpr uint64_t align_down(uint64_t value, uint64_t alignment) { return value & ~(alignment - 1); }
 
 class AlignedBuffer {
@@ -29,7 +31,8 @@ class AlignedBuffer {
       memory_.reset();
       capacity_bytes_ = 0;
       memory_.reset(static_cast<std::byte*>(std::aligned_alloc(kBlockBytes, rounded)));
-      if (!memory_) return Error{ErrorCode::kMemoryCap, "no memory for a buffer of " + std::to_string(rounded) + " bytes"};
+      if (!memory_)
+        return Error{ErrorCode::kMemoryCap, "no memory for a buffer of " + std::to_string(rounded) + " bytes"};
       capacity_bytes_ = rounded;
     }
     return std::span<std::byte>(memory_.get(), bytes);

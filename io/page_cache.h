@@ -6,6 +6,7 @@
 //   threads    any number; two threads that miss the same page read it once, the second waits.
 //   order      among unpinned pages the one with the least waiting work goes first (see WaitingWork), ties
 //              by least recent use; with no WaitingWork this is plain LRU.
+//              Exact up to 512 resident pages; above, work that waits may be stale by one page in 16 (eviction_order.h).
 //   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
 //              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
 //              most kMaxPinsPerThread pages.
@@ -52,12 +53,13 @@ class PagePin {
 
   explicit operator bool() const { return data_ != nullptr; }
   PageId page() const { return page_; }
-  /// The decoded page, aligned to 64 bytes; at least 64 readable bytes follow the end (SIMD loads).
+  /// The decoded page, aligned to 4 KiB; 64 readable zero bytes follow the end (SIMD loads).
   std::span<const std::byte> bytes() const { return {data_, size_}; }
   void reset();
 
  private:
   friend class PageCache;
+  PagePin(PageCache& cache, PageId page, const std::byte* data, uint32_t size);
   PageCache* cache_ = nullptr;
   const std::byte* data_ = nullptr;
   uint32_t size_ = 0;
@@ -78,13 +80,16 @@ class PageCache {
   PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {});
   ~PageCache();
 
-  /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread.
+  /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread, when
+  /// each pins one page of a kind at a time. Tables are not read through the cache.
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
 
-  /// Fails with: kStorage, kCorrupt (after which the render ends).
+  /// Fails with: kStorage, kCorrupt (after which the render ends), kMemoryCap (a page larger than the capacity). A
+  /// thread that waited for another's read of the page counts a hit. Requires: page < page_count() of the file.
   Result<PagePin> pin(PageId page, CacheCounters& counters);
   /// A hint without a promise; used by schedulers to trace what is resident first.
   bool resident(PageId page) const;
+  /// Memory held now: resident pages, pages being read, and buffers kept for the next page.
   uint64_t resident_bytes() const;
   uint64_t peak_resident_bytes() const;
   uint64_t capacity_bytes() const;

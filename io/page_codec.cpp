@@ -29,7 +29,8 @@ uint32_t compress_page(std::span<const std::byte> raw, std::span<std::byte> out)
                                         static_cast<int>(out.size()));
   if (size <= 0) return 0;
   const auto stored = static_cast<uint64_t>(size);
-  return align_up(stored, kPageAlignment) < align_up(raw.size(), kPageAlignment) ? static_cast<uint32_t>(stored) : 0;
+  return align_up(stored, kPageAlignment) < align_up(raw.size(), kPageAlignment) ? static_cast<uint32_t>(stored)
+                                                                                 : 0;
 }
 
 bool decompress_page(std::span<const std::byte> stored, std::span<std::byte> out) {

@@ -1,5 +1,5 @@
-// Packing and checking of one page: lz4 and XXH3 behind plain functions. Called by the page file's writer and reader.
-// Thread rule: any. Cost: a hash runs at memory speed, lz4 decodes at about 2 GB/s a core.
+// Packing and checking of one page: lz4 and XXH3 behind plain functions. Called by the page file's writer and
+// reader. Thread rule: any. Cost: a hash runs at memory speed, lz4 decodes at about 2 GB/s a core.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +18,8 @@ inline constexpr uint64_t kMaxLz4Ratio = 255;
 /// The most bytes compress_page may write.
 uint64_t compressed_bound_bytes(uint64_t raw_bytes);
 
-/// Compresses into `out` (compressed_bound_bytes long). Returns the compressed size, or 0 when it does not pay: a page
-/// that would not take fewer 4 KiB blocks is stored raw, which costs nothing to read.
+/// Compresses into `out` (compressed_bound_bytes long). Returns the compressed size, or 0 when it does not pay: a
+/// page that would not take fewer 4 KiB blocks is stored raw, which costs nothing to read.
 uint32_t compress_page(std::span<const std::byte> raw, std::span<std::byte> out);
 
 /// Decodes exactly out.size() bytes. False when `stored` is not such a page. Requires: the checksum was verified.

@@ -16,8 +16,8 @@ constexpr uint64_t kTableIdCount = 65536;
 
 template <class T>
 Error wrong(const ReadableFile& file, uint64_t offset, const char* what, const T& expected, const T& found) {
-  return {ErrorCode::kCorrupt, fmt::format("{} is damaged at offset {}: {}: expected {}, found {}", file.path(), offset,
-                                           what, expected, found)};
+  return {ErrorCode::kCorrupt, fmt::format("{} is damaged at offset {}: {}: expected {}, found {}", file.path(),
+                                           offset, what, expected, found)};
 }
 
 template <class T>
@@ -50,11 +50,11 @@ Status check_length(ReadableFile& file) {
 }
 
 Status check_superblock(ReadableFile& file, const Superblock& block) {
-  SHOAL_RETURN_IF_ERROR(
-      expect(file, offsetof(Superblock, checksum), "checksum of the superblock", checksum_of(block), block.checksum));
+  SHOAL_RETURN_IF_ERROR(expect(file, offsetof(Superblock, checksum), "checksum of the superblock",
+                               checksum_of(block), block.checksum));
   if (block.version != kPageFileVersion) {
-    return Error{ErrorCode::kInput, fmt::format("{} has format version {}: this program reads version {}", file.path(),
-                                                block.version, kPageFileVersion)};
+    return Error{ErrorCode::kInput, fmt::format("{} has format version {}: this program reads version {}",
+                                                file.path(), block.version, kPageFileVersion)};
   }
   SHOAL_RETURN_IF_ERROR(
       expect(file, offsetof(Superblock, endian_mark), "byte order", kEndianMark, block.endian_mark));
@@ -71,8 +71,8 @@ Status check_footer(ReadableFile& file, const Footer& footer, const Superblock& 
   const uint64_t size = file.size_bytes();
   const uint64_t place = size - sizeof(Footer);
   if (footer.magic != kFooterMagic) {
-    return Error{ErrorCode::kCorrupt,
-                 fmt::format("{} has no footer at offset {}: it was cut off or never finished", file.path(), place)};
+    return Error{ErrorCode::kCorrupt, fmt::format("{} has no footer at offset {}: it was cut off or never finished",
+                                                  file.path(), place)};
   }
   SHOAL_RETURN_IF_ERROR(expect(file, place, "checksum of the footer", checksum_of(footer), footer.checksum));
   SHOAL_RETURN_IF_ERROR(expect(file, place, "format version in the footer", superblock.version, footer.version));
@@ -117,8 +117,8 @@ class DirectoryBuilder {
   }
 
   Result<PageDirectory> finish() {
-    SHOAL_RETURN_IF_ERROR(expect(file_, footer_.directory_offset, "end of the last page", footer_.directory_offset,
-                                 next_offset_));
+    SHOAL_RETURN_IF_ERROR(
+        expect(file_, footer_.directory_offset, "end of the last page", footer_.directory_offset, next_offset_));
     return std::move(directory_);
   }
 
@@ -128,7 +128,8 @@ class DirectoryBuilder {
     if (kind < static_cast<unsigned>(PageKind::kTable) || kind > static_cast<unsigned>(PageKind::kTexture)) {
       return wrong(file_, place, "kind of a page, at most", static_cast<unsigned>(PageKind::kTexture), kind);
     }
-    if (r.raw_bytes > kMaxPageBytes) return wrong(file_, place, "decoded bytes, at most", kMaxPageBytes, r.raw_bytes);
+    if (r.raw_bytes > kMaxPageBytes)
+      return wrong(file_, place, "decoded bytes, at most", kMaxPageBytes, r.raw_bytes);
     if (r.kind != PageKind::kTable) {
       SHOAL_RETURN_IF_ERROR(expect(file_, place, "table of a page that is none", TableId{0}, r.table));
       if (r.raw_bytes == 0) return wrong(file_, place, "decoded bytes, at least", 1u, r.raw_bytes);
@@ -201,8 +202,8 @@ Result<PageDirectory> read_page_directory(ReadableFile& file) {
   if (superblock.magic != kSuperblockMagic && footer.magic != kFooterMagic) {
     return Error{ErrorCode::kInput, fmt::format("{} is not a .shoal file", file.path())};
   }
-  SHOAL_RETURN_IF_ERROR(expect(file, 0, "the name of the format at the start", true,
-                               superblock.magic == kSuperblockMagic));
+  SHOAL_RETURN_IF_ERROR(
+      expect(file, 0, "the name of the format at the start", true, superblock.magic == kSuperblockMagic));
   SHOAL_RETURN_IF_ERROR(check_superblock(file, superblock));
   SHOAL_RETURN_IF_ERROR(check_footer(file, footer, superblock));
 
@@ -217,8 +218,8 @@ Result<PageDirectory> read_page_directory(ReadableFile& file) {
     for (const PageRecord& record : records) SHOAL_RETURN_IF_ERROR(builder.add(record));
     done += static_cast<uint32_t>(records.size());
   }
-  SHOAL_RETURN_IF_ERROR(expect(file, footer.directory_offset, "checksum of the directory", footer.directory_checksum,
-                               hash.value()));
+  SHOAL_RETURN_IF_ERROR(
+      expect(file, footer.directory_offset, "checksum of the directory", footer.directory_checksum, hash.value()));
   return builder.finish();
 }
 

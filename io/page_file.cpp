@@ -29,8 +29,9 @@ Status check_payload(const PageFile& file, const PageRecord& record, std::span<c
 Status decode(const PageFile& file, const PageRecord& record, std::span<const std::byte> payload,
               std::span<std::byte> out) {
   if (decompress_page(payload, out)) return {};
-  return damaged(file, record, fmt::format("expected {} bytes of lz4 that decode to {}, found other bytes",
-                                           record.stored_bytes, record.raw_bytes));
+  return damaged(file, record,
+                 fmt::format("expected {} bytes of lz4 that decode to {}, found other bytes", record.stored_bytes,
+                             record.raw_bytes));
 }
 
 bool all_zero(std::span<const std::byte> bytes) {
@@ -91,8 +92,8 @@ Result<std::vector<std::byte>> PageFile::read_table(TableId table, uint64_t limi
     return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: table {} is absent", path_, table)};
   }
   if (range->bytes > limit_bytes) {
-    return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: table {}: expected at most {} bytes, found {}", path_,
-                                                  table, limit_bytes, range->bytes)};
+    return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: table {}: expected at most {} bytes, found {}",
+                                                  path_, table, limit_bytes, range->bytes)};
   }
   std::vector<std::byte> bytes(range->bytes);
   auto rest = std::span(bytes);
@@ -107,7 +108,8 @@ Result<std::vector<std::byte>> PageFile::read_table(TableId table, uint64_t limi
 Status PageFile::verify() const {
   SHOAL_ASSIGN_OR_RETURN(const PageDirectory again, read_page_directory(*file_));
   if (!std::equal(records_.begin(), records_.end(), again.records.begin(), again.records.end(), same)) {
-    return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its directory changed since it was opened", path_)};
+    return Error{ErrorCode::kCorrupt,
+                 fmt::format("{} is damaged: its directory changed since it was opened", path_)};
   }
   AlignedBuffer stored, decoded;
   for (const PageRecord& record : records_) {

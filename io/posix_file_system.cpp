@@ -15,7 +15,7 @@
 namespace shoal {
 namespace {
 
-constexpr uint64_t kStagingBytes = 256u << 10;   // of an unaligned direct read, at a time
+constexpr uint64_t kStagingBytes = 256u << 10;    // of an unaligned direct read, at a time
 constexpr uint64_t kMaxTransferBytes = 1u << 30;  // Linux moves at most 2^31 - 4096 bytes a call
 
 std::string reason(int error) {
@@ -75,8 +75,9 @@ class PosixReadableFile final : public ReadableFile {
       // Another thread may have switched direct reads off while this one was refused.
       if (got < 0 && errno == EINVAL && !direct_.load(std::memory_order_relaxed)) got = read_buffered(offset, out);
       if (got < 0) {
-        return Error{ErrorCode::kStorage, fmt::format("cannot read {} at offset {}: expected {} bytes, found {} ({})",
-                                                      path_, begin, total, offset - begin, reason(errno))};
+        return Error{ErrorCode::kStorage,
+                     fmt::format("cannot read {} at offset {}: expected {} bytes, found {} ({})", path_, begin,
+                                 total, offset - begin, reason(errno))};
       }
       if (got == 0) return ended(begin, total, offset - begin);
       offset += static_cast<uint64_t>(got);
@@ -87,8 +88,9 @@ class PosixReadableFile final : public ReadableFile {
 
  private:
   Error ended(uint64_t offset, uint64_t expected, uint64_t found) const {
-    return {ErrorCode::kStorage, fmt::format("cannot read {} at offset {}: expected {} bytes, found {} (end of file)",
-                                             path_, offset, expected, found)};
+    return {ErrorCode::kStorage,
+            fmt::format("cannot read {} at offset {}: expected {} bytes, found {} (end of file)", path_, offset,
+                        expected, found)};
   }
 
   ssize_t read_some(uint64_t offset, std::span<std::byte> out) {
@@ -110,8 +112,8 @@ class PosixReadableFile final : public ReadableFile {
     if (!staging) return errno = ENOMEM, -1;
     const uint64_t block = align_down(offset, kBlockBytes);
     const uint64_t skip = offset - block;
-    const uint64_t size = std::min(align_up(skip + std::min<uint64_t>(out.size(), kStagingBytes), kBlockBytes),
-                                   kStagingBytes);
+    const uint64_t size =
+        std::min(align_up(skip + std::min<uint64_t>(out.size(), kStagingBytes), kBlockBytes), kStagingBytes);
     const ssize_t got = pread_retrying(fd_.get(), staging.value().data(), size, block);
     if (got < 0) return got;
     if (static_cast<uint64_t>(got) <= skip) return 0;
@@ -140,8 +142,9 @@ class PosixWritableFile final : public WritableFile {
                                    static_cast<off_t>(offset));
       if (put < 0 && errno == EINTR) continue;
       if (put <= 0) {
-        return Error{ErrorCode::kStorage, fmt::format("cannot write {} at offset {}: {} of {} bytes written ({})", path_,
-                                                      begin, offset - begin, total, put < 0 ? reason(errno) : "stuck")};
+        return Error{ErrorCode::kStorage,
+                     fmt::format("cannot write {} at offset {}: {} of {} bytes written ({})", path_, begin,
+                                 offset - begin, total, put < 0 ? reason(errno) : "stuck")};
       }
       offset += static_cast<uint64_t>(put);
       bytes = bytes.subspan(static_cast<size_t>(put));

@@ -3,29 +3,20 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/memory_file_system.h"
+#include "tests/support/paged_file.h"
 
 namespace shoal {
 namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// Bytes that lz4 packs well (period > 0) or not at all (period = 0).
-Bytes pattern(size_t size, uint32_t seed, uint32_t period) {
-  Bytes bytes(size);
-  uint32_t x = seed * 2654435761u + 1;
-  for (size_t i = 0; i < size; ++i) {
-    x = x * 1664525u + 1013904223u;
-    bytes[i] = period > 0 && i >= period ? bytes[i - period] : static_cast<std::byte>(x >> 24);
-  }
-  return bytes;
-}
 
 TEST(PageFile, GivesBackEveryPageAndTable) {
   MemoryFileSystem fs;
-  const std::vector<Bytes> pages = {pattern(1, 1, 0), pattern(70000, 2, 64), pattern(8192, 3, 0),
-                                    pattern(300001, 4, 0), pattern(300001, 5, 1000)};
-  const Bytes table = pattern(2 * kTablePageBytes + 17, 6, 5000);
-  const Bytes exact = pattern(kTablePageBytes, 7, 300);
+  const std::vector<Bytes> pages = {pattern_bytes(1, 1, 0), pattern_bytes(70000, 2, 64), pattern_bytes(8192, 3, 0),
+                                    pattern_bytes(300001, 4, 0), pattern_bytes(300001, 5, 1000)};
+  const Bytes table = pattern_bytes(2 * kTablePageBytes + 17, 6, 5000);
+  const Bytes exact = pattern_bytes(kTablePageBytes, 7, 300);
   {
     auto writer = PageFileWriter::create(fs, "dir/a.shoal");
     ASSERT_TRUE(writer.ok());

@@ -20,11 +20,18 @@ Fault FaultyFileSystem::next(Call call) {
   const Fault fault = fault_;
   bool applies = false;
   switch (fault) {
-    case Fault::kNone: break;
-    case Fault::kIoError: applies = true; break;
-    case Fault::kDiskFull: applies = call == Call::kCreate || call == Call::kWrite || call == Call::kSync; break;
+    case Fault::kNone:
+      break;
+    case Fault::kIoError:
+      applies = true;
+      break;
+    case Fault::kDiskFull:
+      applies = call == Call::kCreate || call == Call::kWrite || call == Call::kSync;
+      break;
     case Fault::kShortRead:
-    case Fault::kBitFlip: applies = call == Call::kRead; break;
+    case Fault::kBitFlip:
+      applies = call == Call::kRead;
+      break;
   }
   if (!applies) return Fault::kNone;
   const uint64_t number = calls_.fetch_add(1);

@@ -1,5 +1,6 @@
-// A FileSystem that fails on purpose: it passes calls on to another one, and harms the n-th call that the chosen fault
-// applies to. remove() is never harmed: it is how the code under test cleans up. Thread rule: any number of threads.
+// A FileSystem that fails on purpose: it passes calls on to another one, and harms the n-th call that the chosen
+// fault applies to. remove() is never harmed: it is how the code under test cleans up. Thread rule: any number of
+// threads.
 #pragma once
 
 #include <atomic>

@@ -13,8 +13,8 @@ class MemoryFileSystem::Reader final : public ReadableFile {
   Status read_at(uint64_t offset, std::span<std::byte> out) override {
     const uint64_t found = offset < bytes_.size() ? bytes_.size() - offset : 0;
     if (out.size() > found) {
-      return Error{ErrorCode::kStorage, fmt::format("cannot read {} at offset {}: expected {} bytes, found {}", path_,
-                                                    offset, out.size(), found)};
+      return Error{ErrorCode::kStorage, fmt::format("cannot read {} at offset {}: expected {} bytes, found {}",
+                                                    path_, offset, out.size(), found)};
     }
     if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
     return {};

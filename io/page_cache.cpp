@@ -1,0 +1,167 @@
+#include "io/page_cache.h"
+
+#include <algorithm>
+
+#include "io/page_cache_state.h"
+
+namespace shoal {
+
+bool PageCache::State::try_pin(PageId page) {
+  PageSlot& slot = slots[page];
+  if ((slot.state.load(std::memory_order_relaxed) & kResident) == 0) return false;
+  if ((slot.state.fetch_add(1, std::memory_order_acquire) & kResident) == 0) {
+    release(page);
+    return false;
+  }
+  // Most hits find their own stamp: a store each time would move the line between the cores.
+  const uint64_t now = tick.load(std::memory_order_relaxed) | 1;
+  if (slot.last_use.load(std::memory_order_relaxed) != now) slot.last_use.store(now, std::memory_order_relaxed);
+  return true;
+}
+
+/// Sequentially consistent, as wait_for_room() is: either this thread sees the sleeper, or the sleeper sees the
+/// unpin.
+void PageCache::State::release(PageId page) {
+  if (slots[page].state.fetch_sub(1) != (kResident | 1)) return;
+  if (room_waiters.load() == 0) return;
+  const std::lock_guard lock(mutex);
+  unpinned.notify_all();
+}
+
+Status PageCache::State::load(PageId page, PageLoad& load, std::unique_lock<std::mutex>& lock,
+                              CacheCounters& counters) {
+  const uint32_t bytes = page_bytes(page);
+  const Result<std::byte*> buffer = make_room(bytes, lock, counters);
+  Status status;
+  if (buffer.ok()) {
+    lock.unlock();
+    status = read(page, buffer.value(), counters);
+    lock.lock();
+  } else {
+    status = buffer.error();
+  }
+  if (status.ok()) {
+    publish(page, buffer.value(), 1 + load.waiting_threads);
+  } else {
+    load.error = status.error();
+    if (buffer.ok()) {
+      used_bytes -= PageBuffers::charge_bytes(bytes);
+      buffers.keep(buffer.value(), bytes);
+      unpinned.notify_all();
+    }
+  }
+  load.done = true;
+  loads.erase(page);
+  loaded.notify_all();
+  return status;
+}
+
+Status PageCache::State::read(PageId page, std::byte* data, CacheCounters& counters) const {
+  const PageRecord& record = file.record(page);
+  const std::span<std::byte> bytes(data, record.raw_bytes);
+  uint64_t read_bytes = 0;
+  const Status status = file.read_page(page, bytes, &read_bytes);
+  counters.disk_reads_count += read_bytes > 0 ? 1 : 0;
+  counters.disk_read_bytes += read_bytes;
+  if (!status.ok()) return status;
+  PageBuffers::zero_tail(data, record.raw_bytes);
+  counters.decoded_bytes += record.raw_bytes;
+  counters.treelet_loads_count += record.kind == PageKind::kTreelet ? 1 : 0;
+  counters.treelet_load_bytes += record.kind == PageKind::kTreelet ? record.raw_bytes : 0;
+  counters.attribute_loads_count += record.kind == PageKind::kAttributes ? 1 : 0;
+  counters.texture_loads_count += record.kind == PageKind::kTexture ? 1 : 0;
+  return check ? check(record, bytes) : Status();
+}
+
+void PageCache::State::publish(PageId page, std::byte* data, uint32_t pins) {
+  PageSlot& slot = slots[page];
+  slot.data = data;
+  slot.place = static_cast<uint32_t>(residents.size());
+  residents.push_back(page);
+  const uint64_t now = tick.load(std::memory_order_relaxed) + 2;
+  tick.store(now, std::memory_order_relaxed);
+  slot.last_use.store(now, std::memory_order_relaxed);
+  slot.state.fetch_add(kResident + pins, std::memory_order_release);
+}
+
+PageCache::PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check, WaitingWork waiting)
+    : state_(std::make_unique<State>(file, capacity_bytes, std::move(check), std::move(waiting))) {}
+
+PageCache::~PageCache() {
+  for (const PageId page : state_->residents) SHOAL_CHECK(state_->slots[page].state.load() == kResident);
+}
+
+uint64_t PageCache::minimum_capacity_bytes(const PageFile& file, unsigned threads) {
+  uint64_t largest[256] = {};
+  for (const PageRecord& record : file.records()) {
+    uint64_t& bytes = largest[static_cast<uint8_t>(record.kind)];
+    if (record.kind != PageKind::kTable) bytes = std::max(bytes, PageBuffers::charge_bytes(record.raw_bytes));
+  }
+  uint64_t sum = 0;
+  for (const uint64_t bytes : largest) sum += bytes;
+  return sum * threads;
+}
+
+Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
+  State& s = *state_;
+  SHOAL_CHECK(page < s.file.page_count());
+  counters.page_requests_count += 1;
+  if (s.try_pin(page)) {
+    counters.page_hits_count += 1;
+    return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
+  }
+  std::unique_lock lock(s.mutex);
+  const auto under_way = s.loads.find(page);
+  if (under_way != s.loads.end()) {
+    counters.page_hits_count += 1;
+    const std::shared_ptr<PageLoad> load = under_way->second;
+    load->waiting_threads += 1;
+    s.loaded.wait(lock, [&] { return load->done; });
+    if (load->error) return *load->error;
+  } else if (s.try_pin(page)) {
+    counters.page_hits_count += 1;
+  } else {
+    counters.page_misses_count += 1;
+    const auto load = std::make_shared<PageLoad>();
+    s.loads.emplace(page, load);
+    SHOAL_RETURN_IF_ERROR(s.load(page, *load, lock, counters));
+  }
+  return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
+}
+
+void PageCache::unpin(PageId page) { state_->release(page); }
+
+bool PageCache::resident(PageId page) const {
+  return (state_->slots[page].state.load(std::memory_order_relaxed) & kResident) != 0;
+}
+
+uint64_t PageCache::resident_bytes() const { return state_->held_bytes.load(std::memory_order_relaxed); }
+uint64_t PageCache::peak_resident_bytes() const { return state_->peak_bytes.load(std::memory_order_relaxed); }
+uint64_t PageCache::capacity_bytes() const { return state_->capacity_bytes; }
+
+PagePin::PagePin(PageCache& cache, PageId page, const std::byte* data, uint32_t size)
+    : cache_(&cache), data_(data), size_(size), page_(page) {}
+
+PagePin::PagePin(PagePin&& other) noexcept { *this = std::move(other); }
+
+PagePin& PagePin::operator=(PagePin&& other) noexcept {
+  if (this == &other) return *this;
+  reset();
+  cache_ = std::exchange(other.cache_, nullptr);
+  data_ = std::exchange(other.data_, nullptr);
+  size_ = std::exchange(other.size_, 0);
+  page_ = std::exchange(other.page_, kNoPage);
+  return *this;
+}
+
+PagePin::~PagePin() { reset(); }
+
+void PagePin::reset() {
+  if (cache_ != nullptr) cache_->unpin(page_);
+  cache_ = nullptr;
+  data_ = nullptr;
+  size_ = 0;
+  page_ = kNoPage;
+}
+
+}  // namespace shoal

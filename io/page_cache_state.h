@@ -1,0 +1,87 @@
+// The inside of the page cache: slots, reads under way and the lock. Included by page_cache.cpp (pins and loads)
+// and page_cache_eviction.cpp (room for the next page). Thread rule: as the comments say. Cost: 24 bytes a page of
+// the file.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "io/eviction_order.h"
+#include "io/page_buffers.h"
+#include "io/page_cache.h"
+
+namespace shoal {
+
+/// A page's place in the cache. `state` is kResident plus the number of pins; a page that is not resident may show
+/// a pin for an instant, of a thread that came too late and is taking its pin back.
+///
+///   absent (0) --publish, under the lock--> resident and pinned <--pin, unpin--> resident (kResident)
+///   resident (kResident) --evict, under the lock, by compare and swap--> absent
+///
+/// `data` and `place` change under the lock only, and `data` only while the page is absent.
+struct PageSlot {
+  std::atomic<uint32_t> state{0};
+  uint32_t place = 0;                 // in State::residents
+  std::atomic<uint64_t> last_use{0};  // State::tick: even for a load, odd for a hit after it
+  std::byte* data = nullptr;
+};
+inline constexpr uint32_t kResident = 1u << 31;
+
+/// A read under way. Threads that want the same page wait for it, and the loader pins the page for them.
+struct PageLoad {
+  uint32_t waiting_threads = 0;
+  bool done = false;
+  std::optional<Error> error;
+};
+
+struct PageCache::State {
+  State(const PageFile& page_file, uint64_t capacity, PageCheck page_check, WaitingWork waiting_work)
+      : file(page_file),
+        capacity_bytes(capacity),
+        check(std::move(page_check)),
+        waiting(std::move(waiting_work)),
+        slots(std::make_unique<PageSlot[]>(page_file.page_count())) {}
+
+  uint32_t page_bytes(PageId page) const { return file.record(page).raw_bytes; }
+  bool try_pin(PageId page);
+  void release(PageId page);
+
+  // Requires the lock, all of these.
+  Status load(PageId page, PageLoad& load, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
+  Result<std::byte*> make_room(uint32_t bytes, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
+  void wait_for_room(std::unique_lock<std::mutex>& lock, CacheCounters& counters);
+  bool evict_one(CacheCounters& counters);
+  bool try_evict(PageId page, CacheCounters& counters);
+  void rank_candidates();
+  void publish(PageId page, std::byte* data, uint32_t pins);
+  void account();
+
+  // Outside the lock.
+  Status read(PageId page, std::byte* data, CacheCounters& counters) const;
+
+  const PageFile& file;
+  const uint64_t capacity_bytes;
+  const PageCheck check;
+  const WaitingWork waiting;
+  const std::unique_ptr<PageSlot[]> slots;
+  std::atomic<uint64_t> tick{0};
+  std::atomic<uint32_t> room_waiters{0};  // threads that sleep until a page is unpinned
+  std::atomic<uint64_t> held_bytes{0};    // pages and kept buffers
+  std::atomic<uint64_t> peak_bytes{0};
+
+  std::mutex mutex;
+  std::condition_variable loaded;
+  std::condition_variable unpinned;
+  std::vector<PageId> residents;  // in no order
+  std::unordered_map<PageId, std::shared_ptr<PageLoad>> loads;
+  EvictionOrder order;
+  PageBuffers buffers;
+  uint64_t used_bytes = 0;  // charges of resident pages and of pages being read
+};
+
+}  // namespace shoal
