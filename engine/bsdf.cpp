@@ -12,12 +12,8 @@ Bsdf::Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3&
     : frame_(shading_normal), geometric_normal_(geometric_normal), wo_(frame_.to_local(wo)) {
   if (!(wo_.z > 0)) return;
   diffuse_ = material.base_color * (1 - material.metallic);
-  float specular_albedo = 0;
-  if (table != nullptr && material.has_specular_lobe()) {
-    set_specular(material, *table);
-    const SpecularAlbedo e = table->albedo(std::min(wo_.z, 1.0f), ggx_.alpha);
-    specular_albedo = luminance(f0_ * e.a + f90_ * e.b);
-  }
+  const bool specular = table != nullptr && material.has_specular_lobe();
+  const float specular_albedo = specular ? set_specular(material, *table) : 0.0f;
   const float diffuse_albedo = luminance(diffuse_), sum = diffuse_albedo + specular_albedo;
   if (!(sum > 0)) return;
   // Lobes are chosen by what they reflect; the last probability is the rest, so that the two sum to one.
@@ -25,7 +21,7 @@ Bsdf::Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3&
   diffuse_probability_ = 1 - specular_probability_;
 }
 
-void Bsdf::set_specular(const MaterialSample& material, const EnergyTable& table) {
+float Bsdf::set_specular(const MaterialSample& material, const EnergyTable& table) {
   const float m = material.metallic;
   ggx_.alpha = std::clamp(material.roughness * material.roughness, kMinAlpha, 1.0f);
   lambda_o_ = ggx_.lambda(wo_);
@@ -40,6 +36,7 @@ void Bsdf::set_specular(const MaterialSample& material, const EnergyTable& table
 
   const Vec3 dielectric_albedo = (f0_dielectric * e.a + Vec3(material.specular * e.b)) * gain_dielectric;
   diffuse_ *= std::max(0.0f, 1 - max_component(dielectric_albedo));
+  return luminance(f0_ * e.a + f90_ * e.b);
 }
 
 BsdfValue Bsdf::evaluate_local(const Vec3& wi) const {

@@ -54,7 +54,8 @@ class Bsdf {
   BsdfSample sample(float u_lobe, float u1, float u2) const;
 
  private:
-  void set_specular(const MaterialSample& material, const EnergyTable& table);
+  /// Sets the lobe, takes its share from the diffuse one and returns its albedo (luminance).
+  float set_specular(const MaterialSample& material, const EnergyTable& table);
   BsdfValue evaluate_local(const Vec3& wi) const;
 
   Frame frame_;
