@@ -1,0 +1,91 @@
+#include "engine/build_record.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+namespace shoal {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Bytes that are not UTF-8 are replaced: names come from the file.
+std::string dump(const Json& json) { return json.dump(1, ' ', false, Json::error_handler_t::replace); }
+
+int64_t modification_time_ns(const std::string& path) {
+  std::error_code error;
+  const auto time = std::filesystem::last_write_time(path, error);
+  if (error) return 0;
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+}
+
+class SourceHash {
+ public:
+  explicit SourceHash(uint64_t seed) : words_{seed} {}
+  void add(uint64_t word) { words_.push_back(word); }
+  void add_file(FileSystem& fs, const std::string& path, bool modification_times) {
+    auto file = fs.open(path, ReadMode::kBuffered);
+    add(file.ok() ? file.value()->size_bytes() : ~uint64_t{0});
+    if (modification_times) add(static_cast<uint64_t>(modification_time_ns(path)));
+  }
+  uint64_t value() const { return XXH3_64bits(words_.data(), words_.size() * sizeof(uint64_t)); }
+
+ private:
+  std::vector<uint64_t> words_;
+};
+
+}  // namespace
+
+uint64_t source_hash(FileSystem& fs, const gltf::Document& document, bool modification_times) {
+  SourceHash hash(document.content_hash);
+  hash.add_file(fs, document.path, modification_times);  // a .glb carries buffers beside its JSON
+  for (const gltf::Buffer& buffer : document.buffers) {
+    if (!buffer.path.empty()) hash.add_file(fs, buffer.path, modification_times);
+  }
+  for (const gltf::Image& image : document.images) {
+    if (!image.path.empty()) hash.add_file(fs, image.path, modification_times);
+  }
+  return hash.value();
+}
+
+Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options) {
+  SHOAL_ASSIGN_OR_RETURN(const gltf::Document document, gltf::load_document(fs, gltf_path, options.limits));
+  SourceHash hash(source_hash(fs, document, true));
+  hash.add(options.treelet_bytes);
+  hash.add(kSceneVersion);
+  hash.add(XXH3_64bits(kBuilderVersion, std::char_traits<char>::length(kBuilderVersion)));
+  return hash.value();
+}
+
+std::string build_record_json(const gltf::Document& document, const SceneHeader& header,
+                              const SceneBuildReport& report) {
+  Json json;
+  json["shoal_version"] = kBuilderVersion;
+  json["scene_version"] = header.version;
+  json["source"] = std::filesystem::path(document.path).filename().string();
+  json["content_hash"] = fmt::format("{:016x}", header.content_hash);
+  json["options"] = {{"treelet_bytes", header.treelet_bytes}};
+  json["triangles_count"] = header.triangles_count;
+  json["instanced_triangles_count"] = header.instanced_triangles_count;
+  json["degenerate_count"] = header.degenerate_count;
+  json["objects_count"] = report.objects_count;
+  json["instances_count"] = report.instances_count;
+  json["treelets_count"] = report.treelets_count;
+  json["sah_cost"] = report.sah_cost;
+  json["warnings"] = report.warnings;
+  return dump(json);
+}
+
+std::string names_json(const gltf::Document& document, const FlatScene& scene, bool default_material) {
+  Json materials = Json::array(), cameras = Json::array(), lights = Json::array();
+  for (const gltf::Material& material : document.materials) materials.push_back(material.name);
+  if (default_material) materials.push_back("(default)");
+  for (const PlacedItem& item : scene.cameras) cameras.push_back(document.cameras[item.index].name);
+  for (const PlacedItem& item : scene.lights) lights.push_back(document.lights[item.index].name);
+  return dump({{"materials", materials}, {"cameras", cameras}, {"lights", lights}});
+}
+
+}  // namespace shoal

@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+#include <type_traits>
+
+#include "engine/check_tables.h"
+#include "engine/scene.h"
+
+namespace shoal {
+
+namespace {
+
+constexpr uint64_t kMaxTextBytes = 64u << 20;
+constexpr uint64_t kMaxTableBytes = 1ull << 36;
+
+template <class T>
+Result<std::vector<T>> read_rows(const PageFile& file, TableId table, const char* name) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, kMaxTableBytes));
+  if (bytes.size() % sizeof(T) != 0) {
+    return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected rows of {} bytes, found {} bytes",
+                                                  file.path(), name, sizeof(T), bytes.size())};
+  }
+  if (bytes.size() / sizeof(T) >= kNoIndex) {
+    return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected at most {} rows, found {}", file.path(),
+                                                  name, kNoIndex - 1, bytes.size() / sizeof(T))};
+  }
+  std::vector<T> rows(bytes.size() / sizeof(T));
+  if (!bytes.empty()) std::memcpy(static_cast<void*>(rows.data()), bytes.data(), bytes.size());
+  return rows;
+}
+
+Result<std::string> read_text(const PageFile& file, TableId table) {
+  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, kMaxTextBytes));
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+Status read_top_tree(const PageFile& file, uint32_t treelet_count, TraversalOptions traversal, Scene& scene) {
+  SHOAL_ASSIGN_OR_RETURN(auto nodes, read_rows<TopNode>(file, tables::kTopNodes, "top nodes"));
+  SHOAL_ASSIGN_OR_RETURN(auto entries, read_rows<TreeletEntry>(file, tables::kEntries, "treelet entries"));
+  SHOAL_ASSIGN_OR_RETURN(auto instances, read_rows<Instance>(file, tables::kInstances, "instances"));
+  if (Status status = TopTree::check(nodes, entries, instances, treelet_count); !status.ok()) {
+    return Error{status.error().code, file.path() + ": " + status.error().message};
+  }
+  scene.entries_by_treelet.resize(entries.size());
+  std::iota(scene.entries_by_treelet.begin(), scene.entries_by_treelet.end(), 0u);
+  std::sort(scene.entries_by_treelet.begin(), scene.entries_by_treelet.end(), [&](uint32_t a, uint32_t b) {
+    return entries[a].treelet != entries[b].treelet ? entries[a].treelet < entries[b].treelet : a < b;
+  });
+  scene.top_tree = TopTree(std::move(nodes), std::move(entries), std::move(instances), traversal);
+  return {};
+}
+
+}  // namespace
+
+Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode, TraversalOptions traversal) {
+  Scene scene;
+  SHOAL_ASSIGN_OR_RETURN(scene.file, PageFile::open(fs, path, mode));
+  const PageFile& file = *scene.file;
+  SHOAL_ASSIGN_OR_RETURN(const auto headers, read_rows<SceneHeader>(file, tables::kSceneHeader, "scene headers"));
+  if (headers.size() != 1) {
+    return Error{ErrorCode::kCorrupt,
+                 fmt::format("{}: table of scene headers: expected 1 row, found {}", path, headers.size())};
+  }
+  scene.header = headers[0];
+  SHOAL_ASSIGN_OR_RETURN(scene.treelets, read_rows<TreeletPages>(file, tables::kTreelets, "treelets"));
+  SHOAL_ASSIGN_OR_RETURN(scene.materials, read_rows<Material>(file, tables::kMaterials, "materials"));
+  SHOAL_ASSIGN_OR_RETURN(scene.textures, read_rows<Texture>(file, tables::kTextures, "textures"));
+  SHOAL_ASSIGN_OR_RETURN(scene.emitters, read_rows<Emitter>(file, tables::kEmitters, "emitters"));
+  SHOAL_ASSIGN_OR_RETURN(scene.lights, read_rows<PunctualLight>(file, tables::kLights, "lights"));
+  SHOAL_ASSIGN_OR_RETURN(scene.cameras, read_rows<CameraRecord>(file, tables::kCameras, "cameras"));
+  SHOAL_ASSIGN_OR_RETURN(scene.build_record, read_text(file, tables::kBuildRecord));
+  SHOAL_ASSIGN_OR_RETURN(scene.names, read_text(file, tables::kNames));
+  SHOAL_RETURN_IF_ERROR(read_top_tree(file, static_cast<uint32_t>(scene.treelets.size()), traversal, scene));
+  SHOAL_RETURN_IF_ERROR(check_tables(scene));
+  return scene;
+}
+
+uint64_t Scene::resident_bytes() const {
+  const auto bytes = [](const auto& rows) { return uint64_t{rows.capacity()} * sizeof(rows[0]); };
+  return top_tree.resident_bytes() + bytes(treelets) + bytes(materials) + bytes(textures) + bytes(emitters) +
+         bytes(lights) + bytes(cameras) + bytes(entries_by_treelet) + bytes(build_record) + bytes(names) +
+         file->records().size_bytes();
+}
+
+}  // namespace shoal

@@ -1,0 +1,42 @@
+// glTF primitives to a soup of triangles: corners with the attributes that their material calls for, moved to world
+// space where a mesh is baked. Reads in bounded chunks; only the soup grows.
+// Called by engine/build_scene from one thread. Cost: one pass over the accessors that are needed.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/affine_double.h"
+#include "engine/convert_materials.h"
+#include "io/gltf_accessor.h"
+#include "treelets/triangle_soup.h"
+
+namespace shoal {
+
+/// A set of triangles to read: one primitive of a mesh, with the global id of its first triangle.
+struct PrimitiveSource {
+  uint32_t mesh = 0, primitive = 0;
+  uint64_t triangle_count = 0;
+  uint32_t first_id = 0;
+};
+
+/// What the corners of a primitive have to carry: NORMAL when there, TANGENT when there and a normal map uses it,
+/// COLOR_0 when there, the UV sets of the material's textures.
+CornerLayout layout_of(const gltf::Primitive& primitive, const MaterialPlan& plan);
+CornerLayout united(const CornerLayout& a, const CornerLayout& b);
+
+struct ReadCounts {
+  uint64_t degenerate_count = 0;  ///< left out: a corner not finite, or two corners in one place
+  std::vector<std::string> warnings;
+};
+
+/// Appends one primitive. `bake` moves it (null: object space is kept). A map that mirrors keeps the order of corners;
+/// normals go by the inverse transpose, a tangent's handedness turns with the mirror.
+/// Fails with: kInput (an attribute of the wrong type or too short, an index out of range), kStorage.
+Status append_primitive(gltf::BufferFiles& files, const gltf::Document& document, const MaterialPlan& plan,
+                        const PrimitiveSource& source, const AffineDouble* bake, TriangleSoup& soup,
+                        ReadCounts& counts);
+
+}  // namespace shoal
