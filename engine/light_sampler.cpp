@@ -94,9 +94,7 @@ LightSample LightSampler::sample_emitter(const Vec3& position, double chance, do
   const float root = std::sqrt(static_cast<float>(random.u1));
   const float b1 = 1 - root, b2 = static_cast<float>(random.u2) * root;
   sample.target = point_on_triangle(corner(e, 0), corner(e, 1), corner(e, 2), b1, b2);
-  if (e.instance < scene_->top_tree.instance_count()) {
-    sample.target.error += instance_error(sample.target.point, scene_->top_tree.instance(e.instance));
-  }
+  if (e.instance < scene_->top_tree.instance_count()) sample.instance = &scene_->top_tree.instance(e.instance);
   const Vec2 uv0(e.uv[0], e.uv[1]), uv1(e.uv[2], e.uv[3]), uv2(e.uv[4], e.uv[5]);
   sample.emitter_uv = uv0 + (uv1 - uv0) * b1 + (uv2 - uv0) * b2;
 

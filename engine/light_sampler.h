@@ -33,6 +33,7 @@ struct LightSample {
   Vec2 emitter_uv{0};           ///< of the emissive texture
   bool at_infinity = false;
   BoundedPoint target;          ///< where the shadow ray ends, unless at_infinity
+  const Instance* instance = nullptr;  ///< that the emitter belongs to
   Vec3 target_normal{0};        ///< unit, towards the vertex; zero: a point without a surface
 };
 

@@ -110,10 +110,8 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
     result.shadow_t_max = kRayInfinity;
     return {};
   }
-  // The ray ends at t = 1, before the emitter: its far end is moved off by the error of the point and by that of the
-  // ray's own arithmetic, which rounds direction and t by parts of its length.
-  BoundedPoint target = light.target;
-  target.error += gamma_bound(6) * glm::abs(target.point - result.shadow_origin);
+  // The ray ends at t = 1, just before the emitter.
+  const BoundedPoint target = ray_end(light.target, result.shadow_origin, light.instance);
   result.shadow_direction = offset_point(target, light.target_normal) - result.shadow_origin;
   result.shadow_t_max = 1;
   return {};

@@ -53,6 +53,16 @@ BoundedPoint to_world(const BoundedPoint& object_point, const Instance& instance
                  instance_error(p, instance)};
 }
 
+BoundedPoint ray_end(const BoundedPoint& target, const Vec3& origin, const Instance* instance) {
+  BoundedPoint end = target;
+  end.error += gamma_bound(6) * glm::abs(target.point - origin);
+  // Origin and direction are transformed each; the direction is at most as long as both ends' vectors together.
+  if (instance != nullptr) {
+    end.error += 2.0f * (instance_error(origin, *instance) + instance_error(target.point, *instance));
+  }
+  return end;
+}
+
 Vec3 offset_point(const BoundedPoint& p, const Vec3& normal) {
   const Vec3 offset = glm::dot(glm::abs(normal), p.error) * normal;
   Vec3 moved = p.point + offset;

@@ -14,8 +14,6 @@ namespace shoal {
 
 inline constexpr float kEdgeError = 2 * kRoundingUnit;
 inline constexpr float kEdgeUnderflow = std::numeric_limits<float>::min();
-/// Below it 1 / det is a normal number.
-inline constexpr float kMaxFloatDet = 0x1p126f;
 
 struct TriangleHit {
   float t, b1, b2;  ///< barycentrics of the second and third corner
@@ -49,32 +47,23 @@ inline double exact_edge(const Sheared& a, const Sheared& b) {
   return static_cast<double>(a.x) * b.y - static_cast<double>(a.y) * b.x;
 }
 
-/// Weights and t from edge functions that are not of both signs.
-template <class T>
-bool divide(const RaySpace& ray, T u, T v, T w, T det, const Sheared& a, const Sheared& b, const Sheared& c,
-            TriangleHit& hit) {
-  const T inverse = 1 / det;
-  const T b0 = u * inverse, b1 = v * inverse, b2 = w * inverse;
-  hit.t = static_cast<float>((b0 * a.z + b1 * b.z + b2 * c.z) / ray.direction[ray.kz]);
-  hit.b1 = static_cast<float>(b1);
-  hit.b2 = static_cast<float>(b2);
-  return true;
-}
-
-/// The line of the ray meets the triangle: sets t (any sign, unclamped, perhaps NaN) and the weights.
+/// The line of the ray meets the triangle: sets t (any sign, unclamped, perhaps NaN) and the weights. Those come from the
+/// exact edge functions: in float their error, divided by the area that the ray sees, moves t of a sliver or of
+/// a grazing ray by far more than the error of the corners, and a ray would meet the triangle that it leaves.
 inline bool cross_line(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2, TriangleHit& hit) {
   const Sheared a = shear(ray, p0), b = shear(ray, p1), c = shear(ray, p2);
   bool certain[3];
   const float u = edge(c, b, certain[0]), v = edge(a, c, certain[1]), w = edge(b, a, certain[2]);
   if (of_both_signs(certain[0] ? u : 0, certain[1] ? v : 0, certain[2] ? w : 0)) return false;
-  const float det = u + v + w;
-  if (certain[0] && certain[1] && certain[2] && std::abs(det) < kMaxFloatDet) {
-    return divide(ray, u, v, w, det, a, b, c, hit);
-  }
   const double eu = exact_edge(c, b), ev = exact_edge(a, c), ew = exact_edge(b, a);
-  const double exact_det = eu + ev + ew;
-  if (of_both_signs(eu, ev, ew) || exact_det == 0) return false;
-  return divide(ray, eu, ev, ew, exact_det, a, b, c, hit);
+  const double det = eu + ev + ew;
+  if (of_both_signs(eu, ev, ew) || det == 0) return false;
+  const double inverse = 1 / det;
+  const double b0 = eu * inverse, b1 = ev * inverse, b2 = ew * inverse;
+  hit.t = static_cast<float>((b0 * a.z + b1 * b.z + b2 * c.z) / ray.direction[ray.kz]);
+  hit.b1 = static_cast<float>(b1);
+  hit.b2 = static_cast<float>(b2);
+  return true;
 }
 
 }  // namespace triangle_test
