@@ -29,7 +29,8 @@ std::vector<TopNode> build_instance_tree(std::span<const InstanceBounds> instanc
   }
   if (refs.empty()) {
     // One node without children, from the same hand as the others.
-    const BinaryNode nothing{{}, {}, 0, 0, kNoIndex, 0};
+    constexpr float kInf = std::numeric_limits<float>::infinity();
+    const BinaryNode nothing{{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}, 0, 0, kNoIndex, 0};
     const uint32_t leads_to = 0;
     return collapse_top({&nothing, 1}, {&leads_to, 1}, ChildKind::kEmpty);
   }

@@ -97,8 +97,16 @@ struct FinishedTreelet {
 class PagePipeline {
  public:
   PagePipeline(const TriangleSoup& soup, const CoverageCropper& cropper, std::span<const BinaryNode> tree,
-               std::span<const uint32_t> order, const TreeletCut& cut, TreeletSink& sink, BuiltObject& object)
-      : soup_(soup), cropper_(cropper), tree_(tree), order_(order), cut_(cut), sink_(sink), object_(object) {}
+               const WidePlan& plan, std::span<const uint32_t> order, const TreeletCut& cut, TreeletSink& sink,
+               BuiltObject& object)
+      : soup_(soup),
+        cropper_(cropper),
+        tree_(tree),
+        plan_(plan),
+        order_(order),
+        cut_(cut),
+        sink_(sink),
+        object_(object) {}
 
   Status run() {
     size_t next_page = 0, next_added = 0;
@@ -126,7 +134,7 @@ class PagePipeline {
  private:
   FinishedTreelet pack_page(size_t page) const {
     FinishedTreelet finished;
-    Result<PackedTreelet> packed = pack_treelet(tree_, order_, cut_.page_units(page), soup_, cropper_);
+    Result<PackedTreelet> packed = pack_treelet(tree_, plan_, order_, cut_.page_units(page), soup_, cropper_);
     if (!packed.ok()) {
       finished.status = std::move(packed).error();
       return finished;
@@ -150,6 +158,7 @@ class PagePipeline {
   const TriangleSoup& soup_;
   const CoverageCropper& cropper_;
   std::span<const BinaryNode> tree_;
+  const WidePlan& plan_;
   std::span<const uint32_t> order_;
   const TreeletCut& cut_;
   TreeletSink& sink_;
@@ -198,10 +207,11 @@ Result<BuiltObject> build_object(TriangleSoup&& input, const BuildOptions& optio
   tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs[i].id; });
   refs = {};
   measure_leaves(soup, order, tree);
+  const WidePlan plan(tree);
   const CoverageCropper cropper(soup, coverage);
-  const TreeletCut cut = cut_treelets(tree, order, cropper, options.treelet_bytes);
+  const TreeletCut cut = cut_treelets(tree, plan, order, cropper, options.treelet_bytes);
 
-  PagePipeline pipeline(soup, cropper, tree, order, cut, sink, object);
+  PagePipeline pipeline(soup, cropper, tree, plan, order, cut, sink, object);
   SHOAL_RETURN_IF_ERROR(pipeline.run());
   std::vector<uint32_t> entry_of(tree.size(), kNoIndex);
   for (uint32_t i = 0; i < cut.unit_roots.size(); ++i) entry_of[cut.unit_roots[i]] = i;

@@ -1,6 +1,5 @@
 #include "treelets/cut_treelets.h"
 
-#include "treelets/collapse_wide.h"
 #include "treelets/treelet_layout.h"
 
 namespace shoal {
@@ -9,9 +8,9 @@ namespace {
 // Adds up a geometry page as units join it.
 class PageSize {
  public:
-  PageSize(std::span<const BinaryNode> tree, std::span<const uint32_t> order, const CoverageCropper& cropper,
-           uint64_t limit_bytes)
-      : tree_(tree), order_(order), cropper_(cropper), limit_bytes_(limit_bytes) {}
+  PageSize(std::span<const BinaryNode> tree, const WidePlan& plan, std::span<const uint32_t> order,
+           const CoverageCropper& cropper, uint64_t limit_bytes)
+      : tree_(tree), plan_(plan), order_(order), cropper_(cropper), limit_bytes_(limit_bytes) {}
 
   void clear() { plain_bytes_ = sizeof(TreeletHeader), triangle_count_ = record_count_ = 0, crops_.clear(); }
 
@@ -45,7 +44,7 @@ class PageSize {
 
  private:
   void add_unlimited_plain(uint32_t root) {
-    plain_bytes_ += tree_[root].bytes + uint64_t{count_wide_nodes(tree_, root)} * sizeof(QuantizedNode);
+    plain_bytes_ += tree_[root].bytes + uint64_t{plan_.count_nodes(root)} * sizeof(QuantizedNode);
     triangle_count_ += tree_[root].count;
   }
   void add_coverage(uint32_t triangle) {
@@ -56,6 +55,7 @@ class PageSize {
   }
 
   std::span<const BinaryNode> tree_;
+  const WidePlan& plan_;
   std::span<const uint32_t> order_;
   const CoverageCropper& cropper_;
   uint64_t limit_bytes_;
@@ -75,10 +75,10 @@ void find_units(std::span<const BinaryNode> tree, uint32_t root, PageSize& size,
 
 }  // namespace
 
-TreeletCut cut_treelets(std::span<const BinaryNode> tree, std::span<const uint32_t> order,
+TreeletCut cut_treelets(std::span<const BinaryNode> tree, const WidePlan& plan, std::span<const uint32_t> order,
                         const CoverageCropper& cropper, uint32_t treelet_bytes) {
   TreeletCut cut;
-  PageSize size(tree, order, cropper, treelet_bytes);
+  PageSize size(tree, plan, order, cropper, treelet_bytes);
   find_units(tree, 0, size, cut.unit_roots);
 
   size.clear();

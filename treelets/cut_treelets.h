@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "treelets/binned_sah.h"
+#include "treelets/collapse_wide.h"
 #include "treelets/crop_coverage.h"
 
 namespace shoal {
@@ -25,7 +26,7 @@ struct TreeletCut {
 
 /// Requires: BinaryNode::bytes holds the packed bytes of the leaves below (with their primitive ids, without
 /// coverage); `order[first + i]` is the i-th triangle of a node.
-TreeletCut cut_treelets(std::span<const BinaryNode> tree, std::span<const uint32_t> order,
+TreeletCut cut_treelets(std::span<const BinaryNode> tree, const WidePlan& plan, std::span<const uint32_t> order,
                         const CoverageCropper& cropper, uint32_t treelet_bytes);
 
 }  // namespace shoal

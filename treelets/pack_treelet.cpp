@@ -2,7 +2,6 @@
 
 #include <cstring>
 
-#include "treelets/collapse_wide.h"
 #include "treelets/gather_leaf.h"
 #include "treelets/quantize_boxes.h"
 
@@ -17,9 +16,9 @@ void append(std::vector<std::byte>& bytes, std::span<const T> values) {
 
 class Packer {
  public:
-  Packer(std::span<const BinaryNode> tree, std::span<const uint32_t> order, const TriangleSoup& soup,
-         const CoverageCropper& cropper, PackedTreelet& out)
-      : tree_(tree), order_(order), soup_(soup), cropper_(cropper), out_(out) {}
+  Packer(std::span<const BinaryNode> tree, const WidePlan& plan, std::span<const uint32_t> order,
+         const TriangleSoup& soup, const CoverageCropper& cropper, PackedTreelet& out)
+      : tree_(tree), plan_(plan), order_(order), soup_(soup), cropper_(cropper), out_(out) {}
 
   Status pack(std::span<const uint32_t> unit_roots) {
     for (const uint32_t root : unit_roots) out_.roots.push_back(add_subtree(root));
@@ -50,7 +49,7 @@ class Packer {
  private:
   NodeRef add_subtree(uint32_t root) {
     if (tree_[root].leaf()) return add_leaf(tree_[root]);
-    const WideChildren children = open_children(tree_, root);
+    const WideChildren children = plan_.children(root);
     const size_t index = nodes_.size();
     nodes_.emplace_back();
     out_.node_area += half_area(tree_[root]);
@@ -122,6 +121,7 @@ class Packer {
   }
 
   std::span<const BinaryNode> tree_;
+  const WidePlan& plan_;
   std::span<const uint32_t> order_;
   const TriangleSoup& soup_;
   const CoverageCropper& cropper_;
@@ -136,11 +136,11 @@ class Packer {
 
 }  // namespace
 
-Result<PackedTreelet> pack_treelet(std::span<const BinaryNode> tree, std::span<const uint32_t> order,
-                                   std::span<const uint32_t> unit_roots, const TriangleSoup& soup,
-                                   const CoverageCropper& cropper) {
+Result<PackedTreelet> pack_treelet(std::span<const BinaryNode> tree, const WidePlan& plan,
+                                   std::span<const uint32_t> order, std::span<const uint32_t> unit_roots,
+                                   const TriangleSoup& soup, const CoverageCropper& cropper) {
   PackedTreelet packed;
-  SHOAL_RETURN_IF_ERROR(Packer(tree, order, soup, cropper, packed).pack(unit_roots));
+  SHOAL_RETURN_IF_ERROR(Packer(tree, plan, order, soup, cropper, packed).pack(unit_roots));
   return packed;
 }
 

@@ -9,6 +9,7 @@
 
 #include "io/result.h"
 #include "treelets/binned_sah.h"
+#include "treelets/collapse_wide.h"
 #include "treelets/crop_coverage.h"
 #include "treelets/treelet_layout.h"
 #include "treelets/triangle_soup.h"
@@ -25,8 +26,8 @@ struct PackedTreelet {
 };
 
 /// Packs the subtrees of `unit_roots`. Fails with: what the coverage source returns.
-Result<PackedTreelet> pack_treelet(std::span<const BinaryNode> tree, std::span<const uint32_t> order,
-                                   std::span<const uint32_t> unit_roots, const TriangleSoup& soup,
-                                   const CoverageCropper& cropper);
+Result<PackedTreelet> pack_treelet(std::span<const BinaryNode> tree, const WidePlan& plan,
+                                   std::span<const uint32_t> order, std::span<const uint32_t> unit_roots,
+                                   const TriangleSoup& soup, const CoverageCropper& cropper);
 
 }  // namespace shoal
