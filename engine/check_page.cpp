@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/scene.h"
 #include "engine/tile_textures.h"
@@ -29,6 +30,8 @@ bool leaf_in_page(std::span<const std::byte> bytes, uint64_t offset_bytes) {
   if (corners_bytes + 3 * triangles > header.leaves_bytes) return false;
   if (uint64_t{leaf.first_ordinal} + triangles > header.triangle_count) return false;
   if (leaf.has_coverage && header.coverage_offset == 0) return false;
+  const float* positions = at<float>(bytes, header.leaves_offset + offset_bytes + sizeof(LeafHeader));
+  if (!std::all_of(positions, positions + 3 * vertices, [](float v) { return std::isfinite(v); })) return false;
   const uint8_t* corners = at<uint8_t>(bytes, header.leaves_offset + corners_bytes);
   if (std::any_of(corners, corners + 3 * triangles, [&](uint8_t corner) { return corner >= vertices; })) return false;
   return true;
