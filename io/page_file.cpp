@@ -62,7 +62,7 @@ Status PageFile::read_page(PageId id, std::span<std::byte> out, uint64_t* read_b
   const PageRecord& record = records_[id];
   *read_bytes = padded_bytes(record);
   if (record.codec == PageCodec::kRaw) {
-    SHOAL_RETURN_IF_ERROR(file_->read_at(record.offset, out));
+    if (!out.empty()) SHOAL_RETURN_IF_ERROR(file_->read_at(record.offset, out));
     return check_payload(*this, record, out);
   }
   // Whole blocks into an aligned buffer: a direct read needs no copy.
@@ -114,7 +114,7 @@ Status PageFile::verify() const {
   AlignedBuffer stored, decoded;
   for (const PageRecord& record : records_) {
     SHOAL_ASSIGN_OR_RETURN(const auto block, stored.reserve(padded_bytes(record)));
-    SHOAL_RETURN_IF_ERROR(file_->read_at(record.offset, block));
+    if (!block.empty()) SHOAL_RETURN_IF_ERROR(file_->read_at(record.offset, block));
     const auto payload = block.first(record.stored_bytes);
     SHOAL_RETURN_IF_ERROR(check_payload(*this, record, payload));
     if (!all_zero(block.subspan(record.stored_bytes))) {

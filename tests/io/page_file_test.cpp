@@ -10,7 +10,6 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-
 TEST(PageFile, GivesBackEveryPageAndTable) {
   MemoryFileSystem fs;
   const std::vector<Bytes> pages = {pattern_bytes(1, 1, 0), pattern_bytes(70000, 2, 64), pattern_bytes(8192, 3, 0),
