@@ -261,7 +261,9 @@ TEST(BuildScene, BuildsEveryRealScene) {
         build_and_open(posix_file_system(), {}, file.path().string(), (folder / "scene.shoal").string());
     uint64_t triangles = 0;
     for (const auto& object : built.objects) triangles += object.size();
-    if (!built.objects.empty()) EXPECT_EQ(triangles, built.scene.header.triangles_count);
+    if (!built.objects.empty()) {
+      EXPECT_EQ(triangles, built.scene.header.triangles_count);
+    }
     ++count;
   }
   std::filesystem::remove_all(folder);

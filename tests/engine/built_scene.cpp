@@ -65,7 +65,7 @@ Status check_all_pages(const Scene& scene) {
 }
 
 BuiltScene build_and_open(FileSystem& fs, const SceneBuildOptions& options, const std::string& path,
-                          const std::string& output) {
+                          const std::string& output, uint64_t read_back_limit) {
   const auto require = [](const auto& result) {
     if (result.ok()) return;
     ADD_FAILURE() << result.error().message;
