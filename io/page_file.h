@@ -27,7 +27,7 @@ enum class PageKind : uint8_t {
   kTable = 1,       ///< part of a table of the scene (TableId says which)
   kTreelet = 2,     ///< treelet geometry (treelets/treelet_layout.h)
   kAttributes = 3,  ///< shading attributes of a treelet (treelets/attribute_layout.h)
-  kTexture = 4,     ///< a texture tile (engine/texture_layout.h)
+  kTexture = 4,     ///< a texture tile (engine/scene_tables.h)
 };
 enum class PageCodec : uint8_t { kRaw = 0, kLz4 = 1 };
 
