@@ -1,6 +1,6 @@
 // From a soup of triangles to treelets and a tree over them: binned SAH (Wald 2007, "On fast Construction of
 // SAH-based Bounding Volume Hierarchies") to a binary tree, collapsed to 8 children, cut into leaf treelets of at
-// most `treelet_bytes`, each packed into a page; small siblings share a treelet.
+// most `treelet_bytes`, each packed into a page; small neighbours share a treelet.
 // Called by engine/build_scene for each object. Parallel inside (oneTBB); the result depends on the input
 // and the options only, not on the number of threads. Cost: O(n log n), about 150 bytes a triangle of scratch.
 #pragma once
@@ -31,7 +31,9 @@ struct BuiltObject {
   uint64_t triangles_count = 0;      ///< stored
   uint64_t degenerate_count = 0;     ///< skipped: two corners with equal bits, or non-finite corners
   uint64_t leaves_count = 0;
-  double sah_cost = 0;               ///< sum over nodes and leaves of area / root area * tests
+  /// SIMD tests expected of a line that meets the root's box: the sum over wide nodes (resident and in treelets)
+  /// and over leaves of the area of their exact box over the root's, one test each. 0 when the root has no area.
+  double sah_cost = 0;
 };
 
 /// Requires: soup not empty after skipping (an object of only degenerate triangles gives no nodes).

@@ -159,10 +159,11 @@ uint32_t CropSet::add(const CropKey& key) {
   return place->second;
 }
 
-void CropSet::clear() {
-  offsets_.clear();
-  keys_.clear();
-  texel_bytes_ = 0;
+void CropSet::truncate(size_t count) {
+  for (; keys_.size() > count; keys_.pop_back()) {
+    texel_bytes_ -= keys_.back().texel_bytes();
+    offsets_.erase(keys_.back());
+  }
 }
 
 }  // namespace shoal

@@ -56,7 +56,9 @@ class CropSet {
  public:
   /// Texel offset of `key`, which is added when it is new.
   uint32_t add(const CropKey& key);
-  void clear();
+  void clear() { truncate(0); }
+  /// Forgets all keys but the first `count`.
+  void truncate(size_t count);
   uint64_t texel_bytes() const { return texel_bytes_; }
   /// In order of their offsets.
   const std::vector<CropKey>& keys() const { return keys_; }

@@ -1,6 +1,8 @@
-// Which subtrees of the binary tree become treelets. Top-down: a subtree whose page fits the target is a unit;
-// neighbouring units in depth-first order share a page while it fits. Called by treelets/build_object.
-// Serial; the cut depends on the input only. Cost: about 10 ns a triangle; more where crops must be counted.
+// Which subtrees of the binary tree become treelets. Depth first, top down: the largest subtree that fits the
+// page joins it; what does not fit starts the next page, after an underfull page has taken a part of it.
+// So most pages hold one or two large neighbouring subtrees, each with a root of its own.
+// Called by treelets/build_object. Serial; the cut depends on the input only. Cost: about 10 ns a triangle; more
+// where crops must be counted.
 #pragma once
 
 #include <cstdint>
