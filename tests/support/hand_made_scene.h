@@ -127,8 +127,9 @@ class PagePacker {
  private:
   template <class T>
   static void append(std::vector<std::byte>& out, const T* values, size_t count) {
-    const std::byte* bytes = reinterpret_cast<const std::byte*>(values);
-    out.insert(out.end(), bytes, bytes + count * sizeof(T));
+    const size_t at = out.size();
+    out.resize(at + count * sizeof(T));
+    if (count > 0) std::memcpy(out.data() + at, values, count * sizeof(T));
   }
 
   NodeRef add_leaf(std::span<const TestTriangle> triangles) {

@@ -1,5 +1,6 @@
 // The heart of the floor: traversal through top tree and treelets gives, bit for bit, what testing every triangle gives.
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include "tests/support/hand_made_scene.h"
 #include "treelets/trace_treelet_scalar.h"
@@ -144,6 +145,37 @@ TEST(Trace, FindsWhatBruteForceFindsAmongInstances) {
   }
 }
 
+TEST(Trace, FindsHitsOnTheVeryFacesOfInstances) {
+  // Flat objects whose world boxes are flat too, met in their planes, on their corners and from afar: what the object
+  // space accepts, the boxes of the world must not lose.
+  std::mt19937 random(7);
+  const std::vector<TestTriangle> square{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 0}, {{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, 1}};
+  std::vector<Placement> placements;
+  for (int i = 0; i < 60; ++i) {
+    Placement p;
+    const float scale = i % 3 == 0 ? 0.001f : 1.7f;
+    const int axis = i % 3;
+    p.object_to_world.column_x = Vec3(0), p.object_to_world.column_y = Vec3(0), p.object_to_world.column_z = Vec3(0);
+    p.object_to_world.column_x[axis] = scale;
+    p.object_to_world.column_y[(axis + 1) % 3] = -scale;
+    p.object_to_world.column_z[(axis + 2) % 3] = 0.3f;
+    if (i % 4 == 0) p.object_to_world.column_x[(axis + 1) % 3] = 123.4f * scale;
+    p.object_to_world.translation = random_vector(random, i % 2 ? 10.0f : 1000.0f);
+    placements.push_back(p);
+  }
+  const TestScene scene = make_scene({square}, placements);
+  std::vector<Ray> rays;
+  for (int i = 0; i < 4000; ++i) {
+    const Affine3& m = placements[random() % placements.size()].object_to_world;
+    const float u = static_cast<float>(random() % 3) * 0.5f, v = static_cast<float>(random() % 3) * 0.5f;
+    const Vec3 target = m.point({u, v, 0});
+    Vec3 origin = target + random_vector(random, i % 2 ? 3.0f : 3000.0f);
+    if (i % 3 == 0) origin = m.point({3.0f, v, 0});  // in the plane
+    rays.push_back(make_ray(origin, target - origin));
+  }
+  EXPECT_GT(compare(scene, rays), 1000u);
+}
+
 TEST(Trace, ScalesOfCoordinatesDoNotMatter) {
   std::mt19937 random(5);
   for (const float scale : {1e-30f, 1e-10f, 1e10f, 1e18f}) {
@@ -180,6 +212,20 @@ TEST(Trace, DuplicatesResolveToTheSmallestId) {
     EXPECT_LT(ray.hit.primitive, 50u);
   }
   EXPECT_GT(hits, 300u);
+}
+
+TEST(Trace, GivesTheSameBitsOnEveryInstructionSet) {
+  std::mt19937 random(8);
+  const auto soup = random_soup(random, 1000, 0.2f);
+  const TestScene scene = make_scene({soup}, {{0, {}}}, {100, 7});
+  const auto rays = awkward_rays(random, soup, 1000);
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    EXPECT_GT(compare(scene, rays), 300u) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 }  // namespace
