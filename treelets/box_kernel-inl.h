@@ -35,9 +35,9 @@ HWY_INLINE uint32_t cross_boxes(const RaySpace& ray, float t, const Plane& plane
       return hn::Mul(hn::Sub(plane(ray.negative[axis] ^ 1, axis, first), hn::Set(f, ray.far_origin[axis])),
                      hn::Set(f, ray.inverse[axis]));
     };
-    const auto t_near = hn::Max(hn::Max(near(2), hn::Max(near(1), near(0))), hn::Zero(f));
+    const auto t_near = hn::Max(hn::Max(near(1), near(0)), hn::Max(near(2), hn::Zero(f)));
     const auto t_far = hn::Mul(hn::Min(far(2), hn::Min(far(1), far(0))), hn::Set(f, kFarScale));
-    const auto entered = hn::Le(t_near, hn::Min(t_far, hn::Set(f, t)));
+    const auto entered = hn::And(hn::Le(t_near, t_far), hn::Le(t_near, hn::Set(f, t)));
     const auto key = hn::Or(hn::And(hn::BitCast(u, t_near), hn::Set(u, kKeyMask)),
                             hn::Iota(u, static_cast<uint32_t>(first)));
     hn::StoreU(key, u, keys + first);

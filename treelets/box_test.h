@@ -38,11 +38,11 @@ inline BoxSpan cross_box(const RaySpace& ray, const float lo[3], const float hi[
   return span;
 }
 
-/// 2^exponent as a float, subnormal below -126.
-inline float power_of_two(int8_t exponent) {
-  const int e = exponent;
-  return std::bit_cast<float>(e >= -126 ? static_cast<uint32_t>(e + 127) << 23 : 1u << (149 + e));
-}
+/// The least exponent of a QuantizedNode: 2^exponent is a normal number (check_treelet).
+inline constexpr int kMinGridPower = -126;
+
+/// 2^exponent. Requires: exponent >= kMinGridPower.
+inline float power_of_two(int8_t exponent) { return std::bit_cast<float>(static_cast<uint32_t>(exponent + 127) << 23); }
 
 /// A plane of a QuantizedNode: an exact product and one rounded sum, hence monotone in q.
 inline float dequantize(float origin, float step, uint8_t q) { return origin + static_cast<float>(q) * step; }

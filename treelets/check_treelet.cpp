@@ -53,7 +53,7 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
     return corrupt(fmt::format("leaf at {} lies past the {} bytes of leaves", at, h.leaves_bytes));
   }
   const LeafView leaf = treelet.leaf(offset);
-  const uint32_t triangles = leaf.header->triangle_count, vertices = leaf.header->vertex_count;
+  const uint32_t triangles = leaf.triangle_count, vertices = leaf.vertex_count;
   if (triangles < 1 || triangles > kMaxLeafTriangles || vertices < 1 || vertices > kMaxLeafVertices) {
     return corrupt(fmt::format("leaf at {} has {} triangles and {} vertices", at, triangles, vertices));
   }
@@ -61,28 +61,29 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
     return corrupt(fmt::format("leaf at {} ends past the {} bytes of leaves", at, h.leaves_bytes));
   }
   for (uint32_t i = 0; i < 3 * vertices; ++i) {
-    if (!std::isfinite(leaf.axis[0][i])) return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
+    if (!std::isfinite(leaf.axis(0)[i])) return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
   }
   for (uint32_t i = 0; i < 3 * triangles; ++i) {
-    if (leaf.corner[0][i] >= vertices) {
-      return corrupt(fmt::format("leaf at {} names vertex {} of {}", at, leaf.corner[0][i], vertices));
+    if (leaf.corner(0)[i] >= vertices) {
+      return corrupt(fmt::format("leaf at {} names vertex {} of {}", at, leaf.corner(0)[i], vertices));
     }
   }
-  if (uint64_t{leaf.header->first_ordinal} + triangles > h.triangle_count) {
+  if (uint64_t{leaf.header().first_ordinal} + triangles > h.triangle_count) {
     return corrupt(fmt::format("leaf at {} has ordinals from {}, the page {} triangles", at,
-                               leaf.header->first_ordinal, h.triangle_count));
+                               leaf.header().first_ordinal, h.triangle_count));
   }
-  if (leaf.header->has_coverage && h.coverage_offset == 0) {
+  if (leaf.header().has_coverage && h.coverage_offset == 0) {
     return corrupt(fmt::format("leaf at {} has coverage, the page none", at));
   }
   return {};
 }
 
+/// Planes may be infinite (they enclose anything), never NaN.
 Status check_grid(const QuantizedNode& node, uint32_t index) {
   for (int axis = 0; axis < 3; ++axis) {
-    const float step = power_of_two(node.exponent[axis]);
-    if (!std::isfinite(node.origin[axis]) || !std::isfinite(dequantize(node.origin[axis], step, 255))) {
-      return corrupt(fmt::format("node {} has planes that are not finite", index));
+    if (!std::isfinite(node.origin[axis]) || node.exponent[axis] < kMinGridPower) {
+      return corrupt(fmt::format("node {} has a grid with origin {} and exponent {}", index, node.origin[axis],
+                                 node.exponent[axis]));
     }
   }
   return {};

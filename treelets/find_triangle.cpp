@@ -13,7 +13,7 @@ TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot) {
   triangle.p0 = leaf.position(i, 0);
   triangle.p1 = leaf.position(i, 1);
   triangle.p2 = leaf.position(i, 2);
-  triangle.ordinal = leaf.header->first_ordinal + i;
+  triangle.ordinal = leaf.header().first_ordinal + i;
   triangle.primitive = treelet.primitives()[triangle.ordinal];
   triangle.material = treelet.header->uniform_material;
   return triangle;

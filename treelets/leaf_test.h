@@ -36,10 +36,10 @@ inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint
   }
   const bool any_hit = ray.any_hit();
   if (any_hit && !(hit.t < ray.t)) return false;
-  const uint32_t ordinal = leaf.header->first_ordinal + i;
+  const uint32_t ordinal = leaf.header().first_ordinal + i;
   const uint32_t primitive = treelet.primitives()[ordinal];
   if (!any_hit && !comes_before(ray, hit.t, ray.instance, primitive)) return false;
-  if (leaf.header->has_coverage && !passes_coverage(treelet, ray, hit, ordinal, primitive, counters)) return false;
+  if (leaf.header().has_coverage && !passes_coverage(treelet, ray, hit, ordinal, primitive, counters)) return false;
   ray.hit = {ray.instance, primitive, entry.treelet, offset << 4 | i};
   if (any_hit) return true;
   ray.t = hit.t;

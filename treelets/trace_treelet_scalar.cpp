@@ -32,17 +32,17 @@ void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& e
   TraversalStack stack;
   NodeRef ref = entry.root;
   do {
-    if (is_leaf(ref)) {
-      const LeafView leaf = treelet.leaf(leaf_offset(ref));
-      counters.triangle_tests_count += leaf.header->triangle_count;
-      for (uint32_t i = 0; i < leaf.header->triangle_count; ++i) {
-        if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, entry, ray, counters)) return;
-      }
-    } else {
+    while (!is_leaf(ref)) {
       ++counters.node_tests_count;
       const QuantizedNode& node = treelet.nodes[ref];
       uint32_t keys[8];
-      stack.push(keys, node.child, cross_node(space, node, ray.t, keys));
+      const uint32_t mask = cross_node(space, node, ray.t, keys);
+      if (!stack.enter(keys, node.child, mask, ref, [](NodeRef) {}) && !stack.pop(ray.t, ref)) return;
+    }
+    const LeafView leaf = treelet.leaf(leaf_offset(ref));
+    counters.triangle_tests_count += leaf.triangle_count;
+    for (uint32_t i = 0; i < leaf.triangle_count; ++i) {
+      if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, entry, ray, counters)) return;
     }
   } while (stack.pop(ray.t, ref));
 }

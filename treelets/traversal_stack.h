@@ -2,6 +2,8 @@
 // most kMaxTreeletDepth levels at most 7 siblings wait.
 #pragma once
 
+#include <utility>
+
 #include "treelets/box_test.h"
 #include "treelets/treelet_layout.h"
 
@@ -9,22 +11,35 @@ namespace shoal {
 
 class TraversalStack {
  public:
-  /// Pushes the children of one node that the ray enters so that the nearest is on top.
-  void push(const uint32_t keys[8], const NodeRef child[8], uint32_t mask) {
-    const uint32_t base = size_;
-    for (; mask != 0; mask &= mask - 1) {
+  /// Goes on to the nearest of the children of one node that the ray enters (a bit each in `mask`) and leaves the others
+  /// waiting; false when there is none. `foresee` is told of each of them, to prefetch it.
+  template <class Foresee>
+  bool enter(const uint32_t keys[8], const NodeRef child[8], uint32_t mask, NodeRef& next, const Foresee& foresee) {
+    if (mask == 0) return false;
+    const auto take = [&] {
       const uint32_t slot = static_cast<uint32_t>(std::countr_zero(mask));
-      const uint64_t entry = uint64_t{keys[slot]} << 32 | child[slot];
+      mask &= mask - 1;
+      return uint64_t{keys[slot]} << 32 | child[slot];
+    };
+    uint64_t nearest = take();
+    const uint32_t base = size_;
+    while (mask != 0) {
+      uint64_t entry = take();
+      if (entry < nearest) std::swap(entry, nearest);
+      foresee(static_cast<NodeRef>(entry));
       uint32_t i = size_++;
       for (; i > base && entries_[i - 1] < entry; --i) entries_[i] = entries_[i - 1];
       entries_[i] = entry;
     }
+    next = static_cast<NodeRef>(nearest);
+    foresee(next);
+    return true;
   }
   /// The next child whose box begins at or before `t`; false when there is none.
-  bool pop(float t, NodeRef& ref) {
+  bool pop(float t, NodeRef& next) {
     while (size_ > 0) {
       const uint64_t entry = entries_[--size_];
-      ref = static_cast<NodeRef>(entry);
+      next = static_cast<NodeRef>(entry);
       if (key_t(static_cast<uint32_t>(entry >> 32)) <= t) return true;
     }
     return false;

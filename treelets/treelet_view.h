@@ -11,21 +11,25 @@
 namespace shoal {
 
 struct LeafView {
-  const LeafHeader* header;
-  const float* axis[3];     ///< x[], y[], z[] of the vertices
-  const uint8_t* corner[3]; ///< i0[], i1[], i2[] of the triangles
+  const std::byte* leaf;
+  uint32_t triangle_count, vertex_count;
 
-  explicit LeafView(const std::byte* leaf) : header(reinterpret_cast<const LeafHeader*>(leaf)) {
-    const uint32_t vertex_count = header->vertex_count;
-    axis[0] = reinterpret_cast<const float*>(leaf + sizeof(LeafHeader));
-    axis[1] = axis[0] + vertex_count;
-    axis[2] = axis[1] + vertex_count;
-    corner[0] = reinterpret_cast<const uint8_t*>(axis[2] + vertex_count);
-    corner[1] = corner[0] + header->triangle_count;
-    corner[2] = corner[1] + header->triangle_count;
+  explicit LeafView(const std::byte* at)
+      : leaf(at), triangle_count(header().triangle_count), vertex_count(header().vertex_count) {}
+
+  const LeafHeader& header() const { return *reinterpret_cast<const LeafHeader*>(leaf); }
+  /// x[], y[] or z[] of the vertices.
+  const float* axis(uint32_t k) const {
+    return reinterpret_cast<const float*>(leaf + sizeof(LeafHeader)) + size_t{k} * vertex_count;
   }
-  Vec3 vertex(uint32_t i) const { return {axis[0][i], axis[1][i], axis[2][i]}; }
-  Vec3 position(uint32_t triangle, int k) const { return vertex(corner[k][triangle]); }
+  /// i0[], i1[] or i2[] of the triangles.
+  const uint8_t* corner(uint32_t k) const {
+    return reinterpret_cast<const uint8_t*>(axis(3)) + size_t{k} * triangle_count;
+  }
+  Vec3 position(uint32_t triangle, uint32_t k) const {
+    const float* x = axis(0) + corner(k)[triangle];
+    return {x[0], x[vertex_count], x[2 * size_t{vertex_count}]};
+  }
 };
 
 struct TreeletView {

@@ -1,0 +1,153 @@
+// Rays a second through a scene in memory: our treelets against Embree's rtcIntersect1, incoherent rays, one thread.
+//   bench_trace [triangles, default 1000000] [rays, default 300000] [treelet KiB, default 256]
+// Prints a line a program: million rays a second, and for ours tests and treelets a ray. One warm-up, median of five.
+#include <embree3/rtcore.h>
+#include <fmt/format.h>
+
+#include <time.h>
+
+#include <cstdlib>
+
+#include "tests/support/hand_made_scene.h"
+#include "treelets/build_object.h"
+
+namespace shoal::testing {
+namespace {
+
+/// Time of this thread alone, so that a busy machine does not count.
+double thread_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double median_seconds(const std::function<void()>& work) {
+  std::vector<double> seconds;
+  for (int run = 0; run < 6; ++run) {
+    const double start = thread_seconds();
+    work();
+    seconds.push_back(thread_seconds() - start);
+  }
+  std::sort(seconds.begin() + 1, seconds.end());
+  return seconds[3];
+}
+
+class PageSink : public TreeletSink {
+ public:
+  Result<TreeletId> add(std::span<const std::byte> geometry, std::span<const std::byte>) override {
+    pages.emplace_back(geometry);
+    bytes += geometry.size();
+    return static_cast<TreeletId>(pages.size() - 1);
+  }
+  std::vector<AlignedPage> pages;
+  uint64_t bytes = 0;
+};
+
+/// A product-built scene of one identity instance.
+TestScene build_scene(const std::vector<TestTriangle>& triangles, uint32_t treelet_bytes) {
+  TriangleSoup soup;
+  for (const TestTriangle& t : triangles) {
+    for (const Vec3& p : t.p) soup.positions.insert(soup.positions.end(), {p.x, p.y, p.z});
+    soup.primitive.push_back(t.primitive);
+    soup.material.push_back(0);
+  }
+  PageSink sink;
+  BuiltObject object = build_object(std::move(soup), {treelet_bytes}, nullptr, sink).value();
+  TestScene scene;
+  const InstanceBounds bounds{0, object.bounds};
+  scene.nodes = build_instance_tree({&bounds, 1});
+  const uint32_t base = static_cast<uint32_t>(scene.nodes.size());
+  for (TopNode node : object.nodes) {
+    if (node.parent != kNoIndex) node.parent += base << 3;
+    for (int slot = 0; slot < 8; ++slot) node.child[slot] += node.kind[slot] == ChildKind::kNode ? base : 0;
+    scene.nodes.push_back(node);
+  }
+  scene.entries = object.entries;
+  scene.instances.push_back(make_instance({0, {}}, base, object.bounds));
+  for (uint32_t slot = 0; slot < 8; ++slot) {
+    if (scene.nodes[0].kind[slot] == ChildKind::kInstance) scene.instances[0].tree_child = slot;
+  }
+  scene.pages = std::move(sink.pages);
+  fmt::print("{} triangles, {} treelets, {:.1f} bytes a triangle, {} top nodes\n", triangles.size(), scene.pages.size(),
+             static_cast<double>(sink.bytes) / static_cast<double>(triangles.size()), scene.nodes.size());
+  return scene;
+}
+
+void run_ours(const TestScene& scene, const std::vector<Ray>& rays) {
+  const TopTree tree(scene.nodes, scene.entries, scene.instances);
+  TraceCounters counters;
+  uint64_t top_tests = 0, visits = 0, hits = 0;
+  const double seconds = median_seconds([&] {
+    counters = {}, top_tests = visits = hits = 0;
+    for (Ray ray : rays) {
+      RayContext context;
+      for (uint32_t entry; (entry = tree.next(ray, context, top_tests)) != kNoIndex; ++visits) {
+        const TreeletEntry& e = tree.entry(entry);
+        trace_treelet(scene.pages[e.treelet].bytes(), e, tree.instance(ray.instance), ray, context, counters);
+        if (ray.any_hit() && ray.hit.valid()) break;
+      }
+      hits += ray.hit.valid();
+    }
+  });
+  const double n = static_cast<double>(rays.size());
+  fmt::print("ours    {:.3f} Mrays/s  hits {:.3f}  top nodes {:.1f}  treelets {:.2f}  nodes {:.1f}  triangles {:.1f}\n",
+             n / seconds * 1e-6, static_cast<double>(hits) / n, static_cast<double>(top_tests) / n,
+             static_cast<double>(visits) / n, static_cast<double>(counters.node_tests_count) / n,
+             static_cast<double>(counters.triangle_tests_count) / n);
+}
+
+void run_embree(const std::vector<TestTriangle>& triangles, const std::vector<Ray>& rays) {
+  RTCDevice device = rtcNewDevice("threads=2");
+  RTCScene scene = rtcNewScene(device);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  RTCGeometry mesh = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
+                                                               3 * triangles.size()));
+  auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12,
+                                                                 triangles.size()));
+  for (size_t i = 0; i < 3 * triangles.size(); ++i) {
+    std::memcpy(vertices + 3 * i, &triangles[i / 3].p[i % 3], 12);
+    indices[i] = static_cast<uint32_t>(i);
+  }
+  rtcCommitGeometry(mesh);
+  rtcAttachGeometry(scene, mesh);
+  rtcReleaseGeometry(mesh);
+  rtcCommitScene(scene);
+  uint64_t hits = 0;
+  const double seconds = median_seconds([&] {
+    hits = 0;
+    for (const Ray& ray : rays) {
+      RTCRayHit query{};
+      query.ray.org_x = ray.origin.x, query.ray.org_y = ray.origin.y, query.ray.org_z = ray.origin.z;
+      query.ray.dir_x = ray.direction.x, query.ray.dir_y = ray.direction.y, query.ray.dir_z = ray.direction.z;
+      query.ray.tfar = ray.t, query.ray.mask = 0xffffffffu;
+      query.hit.geomID = query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+      RTCIntersectContext context;
+      rtcInitIntersectContext(&context);
+      rtcIntersect1(scene, &context, &query);
+      hits += query.hit.primID != RTC_INVALID_GEOMETRY_ID;
+    }
+  });
+  fmt::print("Embree  {:.3f} Mrays/s  hits {:.3f}\n", static_cast<double>(rays.size()) / seconds * 1e-6,
+             static_cast<double>(hits) / static_cast<double>(rays.size()));
+  rtcReleaseScene(scene);
+  rtcReleaseDevice(device);
+}
+
+void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool embree) {
+  std::mt19937 random(1);
+  const float size = 2.0f / std::cbrt(static_cast<float>(triangle_count));
+  const auto soup = random_soup(random, triangle_count, size);
+  std::vector<Ray> rays;
+  for (size_t i = 0; i < ray_count; ++i) rays.push_back(make_ray(random_vector(random), random_vector(random)));
+  run_ours(build_scene(soup, treelet_bytes), rays);
+  if (embree) run_embree(soup, rays);
+}
+
+}  // namespace
+}  // namespace shoal::testing
+
+int main(int argc, char** argv) {
+  const auto number = [&](int i, unsigned long fallback) { return argc > i ? std::strtoul(argv[i], nullptr, 10) : fallback; };
+  shoal::testing::run(number(1, 1000000), number(2, 300000), static_cast<uint32_t>(number(3, 256)) << 10, number(4, 1) != 0);
+}
