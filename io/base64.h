@@ -1,4 +1,5 @@
-// Base64 (RFC 4648 section 4), as data: URIs carry it. Called by the glTF reader. Cost: one table look-up a character.
+// Base64 (RFC 4648 section 4), as data: URIs carry it. Called by the glTF reader. Cost: one table look-up a
+// character.
 #pragma once
 
 #include <cstddef>

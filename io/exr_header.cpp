@@ -17,7 +17,7 @@ namespace {
 
 constexpr uint32_t kMagic = 20000630;
 constexpr uint32_t kVersionMask = 0xff;
-constexpr uint32_t kLongNames = 0x400;  // the only flag that one part of scan lines may carry
+constexpr uint32_t kLongNames = 0x400;           // the only flag that one part of scan lines may carry
 constexpr uint64_t kMaxHeaderBytes = 16u << 20;  // previews may be large; nothing else is
 constexpr size_t kMaxNameBytes = 255;
 constexpr int64_t kMaxCoordinate = 1 << 28;
@@ -125,9 +125,10 @@ Status check_sizes(const std::string& path, const Seen& seen, uint64_t max_pixel
   const auto height = static_cast<uint64_t>(box.max_y - box.min_y + 1);
   const uint64_t pixels = width * height;  // at most 2^40
   if (pixels > max_pixels || pixels * *seen.channel_count / 4 > max_pixels) {
-    return Error{ErrorCode::kInput, fmt::format("{}: dataWindow: expected at most {} pixels of 4 values, found {} x "
-                                                "{} of {} channels",
-                                                path, max_pixels, width, height, *seen.channel_count)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: dataWindow: expected at most {} pixels of 4 values, found {} x "
+                             "{} of {} channels",
+                             path, max_pixels, width, height, *seen.channel_count)};
   }
   return {};
 }
@@ -136,8 +137,8 @@ Status check_sizes(const std::string& path, const Seen& seen, uint64_t max_pixel
 
 bool is_exr(ReadableFile& file) {
   uint32_t magic = 0;
-  return file.size_bytes() >= sizeof magic &&
-         file.read_at(0, std::as_writable_bytes(std::span(&magic, 1))).ok() && magic == kMagic;
+  return file.size_bytes() >= sizeof magic && file.read_at(0, std::as_writable_bytes(std::span(&magic, 1))).ok() &&
+         magic == kMagic;
 }
 
 Status check_exr_header(ReadableFile& file, uint64_t max_pixels) {
@@ -148,7 +149,8 @@ Status check_exr_header(ReadableFile& file, uint64_t max_pixels) {
   SHOAL_RETURN_IF_ERROR(file.read_at(0, bytes));
   HeaderBytes header(bytes);
   uint32_t magic = 0, version = 0;
-  if (!header.take(magic) || !header.take(version) || magic != kMagic) return bad("expected an OpenEXR, found none");
+  if (!header.take(magic) || !header.take(version) || magic != kMagic)
+    return bad("expected an OpenEXR, found none");
   if ((version & kVersionMask) != 2 || (version & ~(kVersionMask | kLongNames)) != 0) {
     return bad("expected version 2, one part of scan lines, found tiles, deep data or several parts");
   }

@@ -12,9 +12,9 @@ static_assert(std::endian::native == std::endian::little, "the numbers of a .glb
 
 namespace {
 
-constexpr uint32_t kMagic = 0x46546c67;       // "glTF"
-constexpr uint32_t kJsonChunk = 0x4e4f534a;   // "JSON"
-constexpr uint32_t kBinaryChunk = 0x004e4942; // "BIN\0"
+constexpr uint32_t kMagic = 0x46546c67;        // "glTF"
+constexpr uint32_t kJsonChunk = 0x4e4f534a;    // "JSON"
+constexpr uint32_t kBinaryChunk = 0x004e4942;  // "BIN\0"
 constexpr uint64_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 
 template <size_t N>
@@ -39,16 +39,16 @@ Result<std::optional<GlbChunks>> find_glb_chunks(ReadableFile& file) {
   if (header[1] != 2) return bad(file, 4, fmt::format("expected glTF version 2, found {}", header[1]));
   const uint64_t end = header[2];
   if (end > file.size_bytes()) {
-    return bad(file, 8, fmt::format("expected a length within the {} bytes of the file, found {}", file.size_bytes(),
-                                    end));
+    return bad(file, 8,
+               fmt::format("expected a length within the {} bytes of the file, found {}", file.size_bytes(), end));
   }
   GlbChunks chunks;
   for (uint64_t offset = kHeaderBytes; offset + kChunkHeaderBytes <= end;) {
     SHOAL_ASSIGN_OR_RETURN(const auto chunk, read_words<2>(file, offset));
     const FileRange range{offset + kChunkHeaderBytes, chunk[0]};
     if (range.bytes > end - range.offset) {
-      return bad(file, offset, fmt::format("expected a chunk of at most {} bytes, found {}", end - range.offset,
-                                           range.bytes));
+      return bad(file, offset,
+                 fmt::format("expected a chunk of at most {} bytes, found {}", end - range.offset, range.bytes));
     }
     const bool first = offset == kHeaderBytes;
     if (first != (chunk[1] == kJsonChunk)) return bad(file, offset, "expected one JSON chunk, and that first");

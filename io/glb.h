@@ -19,8 +19,8 @@ struct GlbChunks {
   std::optional<FileRange> binary;
 };
 
-/// Nothing when the file does not begin with the magic of a .glb. Fails with: kInput (a version other than 2, chunks
-/// that leave the file, no JSON chunk), kStorage.
+/// Nothing when the file does not begin with the magic of a .glb. Fails with: kInput (a version other than 2,
+/// chunks that leave the file, no JSON chunk), kStorage.
 Result<std::optional<GlbChunks>> find_glb_chunks(ReadableFile& file);
 
 }  // namespace shoal::gltf

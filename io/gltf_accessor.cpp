@@ -19,10 +19,10 @@ namespace {
 constexpr uint64_t kSparseRun = 16384;
 
 struct ElementLayout {
-  uint64_t stride;       ///< from element to element
-  uint32_t columns;      ///< 1, but for matrices
-  uint32_t rows;         ///< components of a column
-  uint64_t column_bytes; ///< with padding
+  uint64_t stride;        ///< from element to element
+  uint32_t columns;       ///< 1, but for matrices
+  uint32_t rows;          ///< components of a column
+  uint64_t column_bytes;  ///< with padding
 };
 
 ElementLayout layout_of(const Accessor& accessor, uint64_t stride) {
@@ -161,8 +161,8 @@ Status AccessorReader::apply_sparse(uint64_t first, uint64_t n, std::span<std::b
     if (begin == end) continue;
     const uint64_t value = run * kSparseRun + static_cast<uint64_t>(begin - indices.begin());
     values.resize(static_cast<size_t>(end - begin) * element_bytes_);  // at most a block: indices are distinct
-    SHOAL_RETURN_IF_ERROR(files_->read(
-        view.buffer, view.byte_offset + sparse.values_offset + value * element_bytes_, values));
+    SHOAL_RETURN_IF_ERROR(
+        files_->read(view.buffer, view.byte_offset + sparse.values_offset + value * element_bytes_, values));
     const std::byte* source = values.data();
     for (auto it = begin; it != end; ++it, source += element_bytes_) {
       std::memcpy(bytes.data() + (*it - first) * stride_, source, element_bytes_);

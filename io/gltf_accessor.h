@@ -48,8 +48,8 @@ class AccessorReader {
 
   uint64_t count() const { return count_; }
   uint32_t components() const { return components_; }
-  /// Elements [first, first + n) as floats (normalised integers scaled as in glTF 2.0 section 3.11), n * components().
-  /// Fails with: kInput (beyond count()), kStorage.
+  /// Elements [first, first + n) as floats (normalised integers scaled as in glTF 2.0 section 3.11), n *
+  /// components(). Fails with: kInput (beyond count()), kStorage.
   Status read_floats(uint64_t first, uint64_t n, std::span<float> out);
   /// The same for unsigned integer scalars.
   Status read_indices(uint64_t first, uint64_t n, std::span<uint32_t> out);
@@ -79,8 +79,8 @@ class AccessorReader {
   uint32_t components_ = 0;
   uint64_t stride_ = 0, element_bytes_ = 0;
   uint64_t block_elements_ = 0;
-  std::vector<Block> blocks_;           // kBlockCount, filled on first use
-  std::vector<uint32_t> sparse_firsts_; // the first of every kSparseRun sparse indices
+  std::vector<Block> blocks_;            // kBlockCount, filled on first use
+  std::vector<uint32_t> sparse_firsts_;  // the first of every kSparseRun sparse indices
 };
 
 /// A run of triangles of a primitive: vertex indices, 3 a triangle, after strips and fans are undone.
@@ -102,7 +102,7 @@ class TriangleStream {
   std::optional<AccessorReader> indices_;
   PrimitiveMode mode_ = PrimitiveMode::kTriangles;
   uint64_t count_ = 0, vertex_count_ = 0;
-  std::string place_;  // of messages
+  std::string place_;     // of messages
   uint32_t restart_ = 0;  // the largest value of the index type: primitive restart, which glTF forbids
 };
 

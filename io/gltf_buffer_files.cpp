@@ -20,10 +20,10 @@ Result<ReadableFile*> BufferFiles::open(uint32_t buffer) {
   SHOAL_ASSIGN_OR_RETURN(auto file, fs_->open(source.path, ReadMode::kBuffered));
   const uint64_t size = file->size_bytes();
   if (source.path_offset > size || source.byte_length > size - source.path_offset) {
-    return Error{ErrorCode::kInput,
-                 fmt::format("{}: buffers[{}].byteLength: expected at most the {} bytes of {}, found {}",
-                             document_->path, buffer, size - std::min(size, source.path_offset), source.path,
-                             source.byte_length)};
+    return Error{
+        ErrorCode::kInput,
+        fmt::format("{}: buffers[{}].byteLength: expected at most the {} bytes of {}, found {}", document_->path,
+                    buffer, size - std::min(size, source.path_offset), source.path, source.byte_length)};
   }
   files_[buffer] = std::move(file);
   open_buffers_.push_back(buffer);

@@ -11,11 +11,12 @@ namespace {
 /// glTF allows 252; larger ones are read as well, as long as a window still holds many elements.
 constexpr uint64_t kMaxStrideBytes = 4096;
 
-void read_buffer_source(const JsonNode& node, uint64_t i, const std::optional<FileRange>& binary, Document& document,
-                        Buffer& buffer) {
+void read_buffer_source(const JsonNode& node, uint64_t i, const std::optional<FileRange>& binary,
+                        Document& document, Buffer& buffer) {
   const std::string uri = node.text("uri");
   if (uri.empty()) {
-    if (i != 0 || !binary) return node.fail_at("uri", "a URI (only the first buffer of a .glb has none)", "nothing");
+    if (i != 0 || !binary)
+      return node.fail_at("uri", "a URI (only the first buffer of a .glb has none)", "nothing");
     if (binary->bytes < buffer.byte_length) {
       return node.fail_at("byteLength", fmt::format("at most the {} bytes of the BIN chunk", binary->bytes),
                           fmt::format("{}", buffer.byte_length));
@@ -50,7 +51,8 @@ void read_views(const JsonNode& root, const Limits& limits, Document& document) 
     if (root.failed()) return;
     const uint64_t buffer_bytes = document.buffers[view.buffer].byte_length;
     if (view.byte_offset > buffer_bytes || view.byte_length > buffer_bytes - view.byte_offset) {
-      node.fail_at("byteLength", fmt::format("a view inside the {} bytes of buffers[{}]", buffer_bytes, view.buffer),
+      node.fail_at("byteLength",
+                   fmt::format("a view inside the {} bytes of buffers[{}]", buffer_bytes, view.buffer),
                    fmt::format("{} bytes from {}", view.byte_length, view.byte_offset));
     }
   }
@@ -112,7 +114,8 @@ SparseAccessor read_sparse(const JsonNode& node, const Document& document, const
   sparse.indices_type = read_component_type(indices);
   if (sparse.indices_type != ComponentType::kUnsignedByte && sparse.indices_type != ComponentType::kUnsignedShort &&
       sparse.indices_type != ComponentType::kUnsignedInt) {
-    indices.fail_at("componentType", "5121, 5123 or 5125", fmt::format("{}", static_cast<int>(sparse.indices_type)));
+    indices.fail_at("componentType", "5121, 5123 or 5125",
+                    fmt::format("{}", static_cast<int>(sparse.indices_type)));
   }
   if (node.failed()) return sparse;
   const uint64_t index = component_bytes(sparse.indices_type), element = element_bytes(accessor);

@@ -20,8 +20,8 @@ Result<Source> read_source(FileSystem& fs, const std::string& path, const Limits
   SHOAL_ASSIGN_OR_RETURN(const auto chunks, find_glb_chunks(*file));
   const FileRange range = chunks ? chunks->json : FileRange{0, file->size_bytes()};
   if (range.bytes > limits.json_bytes) {
-    return Error{ErrorCode::kInput,
-                 fmt::format("{}: expected at most {} bytes of JSON, found {}", path, limits.json_bytes, range.bytes)};
+    return Error{ErrorCode::kInput, fmt::format("{}: expected at most {} bytes of JSON, found {}", path,
+                                                limits.json_bytes, range.bytes)};
   }
   Source source;
   source.json.resize(range.bytes);
@@ -48,7 +48,8 @@ void warn_about_motion(const JsonNode& root, const Limits& limits, Document& doc
     for (uint64_t k = 0; k < primitives.size() && !morphs; ++k) morphs = primitives[k].member("targets").size() > 0;
   }
   if (morphs) kinds += kinds.empty() ? "morph targets" : ", morph targets";
-  if (root.array("animations", limits.objects_count).size() > 0) kinds += kinds.empty() ? "animations" : ", animations";
+  if (root.array("animations", limits.objects_count).size() > 0)
+    kinds += kinds.empty() ? "animations" : ", animations";
   if (!kinds.empty()) document.warnings.push_back(kinds + ": not posed yet, the rest geometry is used");
 }
 

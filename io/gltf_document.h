@@ -27,7 +27,14 @@ struct Limits {
   uint64_t image_pixels = 1ull << 28;       ///< of one image
 };
 
-enum class ComponentType : uint16_t { kByte = 5120, kUnsignedByte, kShort, kUnsignedShort, kUnsignedInt = 5125, kFloat };
+enum class ComponentType : uint16_t {
+  kByte = 5120,
+  kUnsignedByte,
+  kShort,
+  kUnsignedShort,
+  kUnsignedInt = 5125,
+  kFloat
+};
 uint32_t component_bytes(ComponentType type);
 
 struct Buffer {
@@ -63,7 +70,15 @@ struct Accessor {
   std::optional<SparseAccessor> sparse;
 };
 
-enum class PrimitiveMode : uint8_t { kPoints, kLines, kLineLoop, kLineStrip, kTriangles, kTriangleStrip, kTriangleFan };
+enum class PrimitiveMode : uint8_t {
+  kPoints,
+  kLines,
+  kLineLoop,
+  kLineStrip,
+  kTriangles,
+  kTriangleStrip,
+  kTriangleFan
+};
 
 struct Primitive {
   std::map<std::string, uint32_t> attributes;  ///< POSITION, NORMAL, TEXCOORD_0, ... -> accessor

@@ -12,8 +12,8 @@ namespace shoal::gltf {
 namespace {
 
 constexpr std::array<std::string_view, 5> kRead = {
-    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
-    "KHR_mesh_quantization",
+    "KHR_lights_punctual",    "KHR_materials_emissive_strength", "KHR_materials_ior",
+    "KHR_materials_specular", "KHR_mesh_quantization",
 };
 
 /// Extensions that only describe: leaving them out changes no picture.

@@ -133,7 +133,9 @@ void JsonNode::each_member(const std::function<void(const char*, const JsonNode&
   }
 }
 
-uint64_t JsonNode::size() const { return value_ != nullptr && as_json(value_).is_array() ? as_json(value_).size() : 0; }
+uint64_t JsonNode::size() const {
+  return value_ != nullptr && as_json(value_).is_array() ? as_json(value_).size() : 0;
+}
 
 JsonNode JsonNode::operator[](uint64_t i) const { return step(nullptr, i, &as_json(value_)[i]); }
 

@@ -1,8 +1,9 @@
 // JSON as the glTF readers see it: typed getters that check range and kind and name the place of what is wrong
-// ("scene.gltf: accessors[3].count: expected a whole number >= 0, found -1"). The first error sticks to the text and
-// every getter after it returns its fallback, so that a section is read straight down and asked once, by
+// ("scene.gltf: accessors[3].count: expected a whole number >= 0, found -1"). The first error sticks to the text
+// and every getter after it returns its fallback, so that a section is read straight down and asked once, by
 // JsonText::status(). Nesting and the number of values are bounded before anything is built. nlohmann-json stays
-// inside the .cpp. Thread rule: one text, one thread. Cost: one map look-up a getter; places are spelled only on error.
+// inside the .cpp. Thread rule: one text, one thread. Cost: one map look-up a getter; places are spelled only on
+// error.
 #pragma once
 
 #include <array>
@@ -61,7 +62,8 @@ class JsonNode {
     return fallback;
   }
   template <size_t N>
-  std::array<double, N> clamped_numbers(const char* name, std::array<double, N> fallback, double lo, double hi) const {
+  std::array<double, N> clamped_numbers(const char* name, std::array<double, N> fallback, double lo,
+                                        double hi) const {
     read_numbers(name, fallback.data(), N);
     clamp_numbers(name, fallback.data(), N, lo, hi);
     return fallback;

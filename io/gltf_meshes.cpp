@@ -62,8 +62,8 @@ Primitive read_primitive(const JsonNode& node, const Document& document) {
   check_indices(node, document, primitive);
   primitive.material = node.index("material", document.materials.size());
   constexpr auto kLast = static_cast<uint64_t>(PrimitiveMode::kTriangleFan);
-  primitive.mode = static_cast<PrimitiveMode>(
-      node.whole("mode", static_cast<uint64_t>(PrimitiveMode::kTriangles), kLast));
+  primitive.mode =
+      static_cast<PrimitiveMode>(node.whole("mode", static_cast<uint64_t>(PrimitiveMode::kTriangles), kLast));
   return primitive;
 }
 

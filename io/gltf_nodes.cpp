@@ -14,10 +14,22 @@ std::array<double, 16> compose(const std::array<double, 3>& t, const std::array<
                                const std::array<double, 3>& s) {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-  return {s[0] * (1 - 2 * (y * y + z * z)), s[0] * 2 * (x * y + w * z),       s[0] * 2 * (x * z - w * y),       0,
-          s[1] * 2 * (x * y - w * z),       s[1] * (1 - 2 * (x * x + z * z)), s[1] * 2 * (y * z + w * x),       0,
-          s[2] * 2 * (x * z + w * y),       s[2] * 2 * (y * z - w * x),       s[2] * (1 - 2 * (x * x + y * y)), 0,
-          t[0],                             t[1],                             t[2],                             1};
+  return {s[0] * (1 - 2 * (y * y + z * z)),
+          s[0] * 2 * (x * y + w * z),
+          s[0] * 2 * (x * z - w * y),
+          0,
+          s[1] * 2 * (x * y - w * z),
+          s[1] * (1 - 2 * (x * x + z * z)),
+          s[1] * 2 * (y * z + w * x),
+          0,
+          s[2] * 2 * (x * z + w * y),
+          s[2] * 2 * (y * z - w * x),
+          s[2] * (1 - 2 * (x * x + y * y)),
+          0,
+          t[0],
+          t[1],
+          t[2],
+          1};
 }
 
 std::array<double, 16> read_matrix(const JsonNode& node) {

@@ -108,9 +108,10 @@ Result<Image8> decode_jpeg(std::span<const std::byte> bytes, const std::string& 
   }
   const J_COLOR_SPACE space = reader.jpeg.jpeg_color_space;
   if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB) {
-    return Error{ErrorCode::kInput, fmt::format("{}: expected a grey, RGB or YCbCr JPEG, found another colour space "
-                                                "(CMYK?); convert it to RGB",
-                                                name)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: expected a grey, RGB or YCbCr JPEG, found another colour space "
+                             "(CMYK?); convert it to RGB",
+                             name)};
   }
   image.rgba.resize(pixels * 4);
   if (!read_pixels(reader, image.rgba.data())) {

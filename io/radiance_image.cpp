@@ -47,8 +47,8 @@ bool parse_size(std::string_view line, uint32_t& width, uint32_t& height) {
   if (y.ec != std::errc() || !line.starts_with(" +X ")) return false;
   line.remove_prefix(4);
   const auto x = std::from_chars(line.data(), line.data() + line.size(), width);
-  return x.ec == std::errc() && x.ptr == line.data() + line.size() && width > 0 && height > 0 && width <= kMaxSide &&
-         height <= kMaxSide;
+  return x.ec == std::errc() && x.ptr == line.data() + line.size() && width > 0 && height > 0 &&
+         width <= kMaxSide && height <= kMaxSide;
 }
 
 /// One component at a time: a count above 128 repeats the next byte, others copy. False: runs that do not fit.

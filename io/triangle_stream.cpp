@@ -34,8 +34,9 @@ Result<TriangleStream> TriangleStream::open(BufferFiles& files, const Document& 
   stream.place_ = fmt::format("{}: accessors[{}]", document.path, primitive.indices.value_or(position->second));
   constexpr uint64_t kMaxVertices = std::numeric_limits<uint32_t>::max();
   if (stream.vertex_count_ > kMaxVertices) {
-    return Error{ErrorCode::kInput, fmt::format("{}: accessors[{}].count: expected at most {} vertices, found {}",
-                                                document.path, position->second, kMaxVertices, stream.vertex_count_)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: accessors[{}].count: expected at most {} vertices, found {}", document.path,
+                             position->second, kMaxVertices, stream.vertex_count_)};
   }
   uint64_t corner_count = stream.vertex_count_;
   if (primitive.indices) {
@@ -51,9 +52,10 @@ Result<TriangleStream> TriangleStream::open(BufferFiles& files, const Document& 
 Status TriangleStream::check_range(uint64_t first, std::span<const uint32_t> indices) const {
   for (size_t i = 0; i < indices.size(); ++i) {
     if (indices[i] < vertex_count_ && indices[i] != restart_) continue;
-    return Error{ErrorCode::kInput,
-                 fmt::format("{}: index {}: expected a vertex below {}, found {}{}", place_, first + i, vertex_count_,
-                             indices[i], indices[i] == restart_ ? " (primitive restart, which glTF forbids)" : "")};
+    return Error{
+        ErrorCode::kInput,
+        fmt::format("{}: index {}: expected a vertex below {}, found {}{}", place_, first + i, vertex_count_,
+                    indices[i], indices[i] == restart_ ? " (primitive restart, which glTF forbids)" : "")};
   }
   return {};
 }

@@ -78,9 +78,13 @@ TEST(AccessorReader, GivesZerosWithoutAViewAndThenItsSparseValues) {
   GltfScene scene;
   scene.add_accessor({{"type", "VEC2"}, {"componentType", kFloat}, {"count", 3}});
   const uint32_t indices = scene.add_view<uint8_t>({1}), values = scene.add_view<float>({7, 8});
-  scene.add_accessor({{"type", "VEC2"}, {"componentType", kFloat}, {"count", 3},
-                      {"sparse", {{"count", 1}, {"indices", {{"bufferView", indices}, {"componentType", kUnsignedByte}}},
-                                  {"values", {{"bufferView", values}}}}}});
+  scene.add_accessor({{"type", "VEC2"},
+                      {"componentType", kFloat},
+                      {"count", 3},
+                      {"sparse",
+                       {{"count", 1},
+                        {"indices", {{"bufferView", indices}, {"componentType", kUnsignedByte}}},
+                        {"values", {{"bufferView", values}}}}}});
   Loaded loaded(scene);
   EXPECT_THAT(read_all(loaded.fs, loaded.document, 0), ElementsAre(0, 0, 0, 0, 0, 0));
   EXPECT_THAT(read_all(loaded.fs, loaded.document, 1), ElementsAre(0, 0, 7, 8, 0, 0));
@@ -95,10 +99,11 @@ struct LongAccessor {
     std::mt19937 random(7);
     std::vector<float> base(3 * kCount);
     for (uint64_t i = 0; i < kCount; ++i) {
-      for (uint64_t c = 0; c < 2; ++c) expected[2 * i + c] = base[3 * i + c] = static_cast<float>(random() % 100000);
+      for (uint64_t c = 0; c < 2; ++c)
+        expected[2 * i + c] = base[3 * i + c] = static_cast<float>(random() % 100000);
     }
-    json accessor = {{"bufferView", scene.add_view(base, 12)}, {"type", "VEC2"}, {"componentType", kFloat},
-                     {"count", kCount}};
+    json accessor = {
+        {"bufferView", scene.add_view(base, 12)}, {"type", "VEC2"}, {"componentType", kFloat}, {"count", kCount}};
     if (sparse) accessor["sparse"] = add_sparse(random);
     scene.add_accessor(accessor);
   }
@@ -155,10 +160,13 @@ TEST(AccessorReader, RefusesSparseIndicesThatAreNotIncreasingOrOutOfRange) {
   for (const std::vector<uint16_t>& indices : {std::vector<uint16_t>{1, 1}, {2, 1}, {0, 3}, {3, 65535}}) {
     GltfScene scene;
     const uint32_t index_view = scene.add_view(indices), value_view = scene.add_view<float>({1, 2});
-    scene.add_accessor({{"type", "SCALAR"}, {"componentType", kFloat}, {"count", 3},
-                        {"sparse", {{"count", 2},
-                                    {"indices", {{"bufferView", index_view}, {"componentType", kUnsignedShort}}},
-                                    {"values", {{"bufferView", value_view}}}}}});
+    scene.add_accessor({{"type", "SCALAR"},
+                        {"componentType", kFloat},
+                        {"count", 3},
+                        {"sparse",
+                         {{"count", 2},
+                          {"indices", {{"bufferView", index_view}, {"componentType", kUnsignedShort}}},
+                          {"values", {{"bufferView", value_view}}}}}});
     Loaded loaded(scene);
     BufferFiles files(loaded.fs, loaded.document);
     const auto reader = AccessorReader::open(files, loaded.document, 0);
@@ -202,9 +210,10 @@ TEST(BufferFiles, ReopenBuffersWhenThereAreMoreThanMayBeOpen) {
 
 GltfScene scene_of_mode(int mode, const std::vector<uint16_t>& indices, uint64_t vertex_count) {
   GltfScene scene;
-  json primitive = {{"attributes", {{"POSITION", scene.add_accessor(std::vector<float>(3 * vertex_count), "VEC3",
-                                                                    kFloat, vertex_count)}}},
-                    {"mode", mode}};
+  json primitive = {
+      {"attributes",
+       {{"POSITION", scene.add_accessor(std::vector<float>(3 * vertex_count), "VEC3", kFloat, vertex_count)}}},
+      {"mode", mode}};
   if (!indices.empty()) {
     primitive["indices"] = scene.add_accessor(indices, "SCALAR", kUnsignedShort, indices.size());
   }

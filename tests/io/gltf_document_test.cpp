@@ -59,7 +59,8 @@ TEST(GltfDocument, DecodesBuffersAndImagesInDataUris) {
   scene.root["buffers"] = {{{"byteLength", 5}, {"uri", "data:application/octet-stream;base64,aGVsbG8="}}};
   scene.root["images"][0] = {{"uri", "data:image/png;base64,AQID"}};
   scene.root["bufferViews"] = {{{"buffer", 0}, {"byteLength", 5}}};
-  scene.root["accessors"] = {{{"bufferView", 0}, {"count", 5}, {"type", "SCALAR"}, {"componentType", kUnsignedByte}}};
+  scene.root["accessors"] = {
+      {{"bufferView", 0}, {"count", 5}, {"type", "SCALAR"}, {"componentType", kUnsignedByte}}};
   scene.root.erase("meshes");
   scene.root["nodes"][0].erase("mesh");
   MemoryFileSystem fs;
@@ -73,7 +74,9 @@ TEST(GltfDocument, ReadsMaterialsWithTheirExtensions) {
   GltfScene scene = triangle_scene();
   scene.root["materials"][0] = {
       {"pbrMetallicRoughness",
-       {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}}, {"metallicFactor", 0.25}, {"roughnessFactor", 0.75},
+       {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
+        {"metallicFactor", 0.25},
+        {"roughnessFactor", 0.75},
         {"metallicRoughnessTexture", {{"index", 0}}}}},
       {"normalTexture", {{"index", 0}, {"scale", 2}}},
       {"emissiveFactor", {1, 0.5, 0}},
@@ -137,8 +140,8 @@ TEST(GltfDocument, WarnsOnceOfEachExtensionThatIsUsedButNotRead) {
   GltfScene scene = triangle_scene();
   scene.root["extensionsUsed"] = {"KHR_materials_transmission", "KHR_materials_ior", "ACME_rocket",
                                   "KHR_materials_transmission"};
-  EXPECT_THAT(load(scene).warnings,
-              ElementsAre("ACME_rocket is not known and is ignored", "KHR_materials_transmission is not simulated yet"));
+  EXPECT_THAT(load(scene).warnings, ElementsAre("ACME_rocket is not known and is ignored",
+                                                "KHR_materials_transmission is not simulated yet"));
 }
 
 TEST(GltfDocument, RefusesARequiredExtensionWithAdvice) {

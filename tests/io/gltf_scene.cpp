@@ -68,10 +68,11 @@ GltfScene triangle_scene() {
   scene.root["images"] = {{{"uri", "a%20b.png"}}};
   scene.root["samplers"] = {{{"wrapS", 33071}, {"magFilter", 9728}}};
   scene.root["textures"] = {{{"source", 0}, {"sampler", 0}}};
-  scene.root["materials"] = {{{"name", "paint"},
-                              {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}, {"texCoord", 1}}}}}}};
+  scene.root["materials"] = {
+      {{"name", "paint"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}, {"texCoord", 1}}}}}}};
   scene.root["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.5}, {"znear", 0.1}}}}};
-  scene.add_mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}, {"indices", indices}, {"material", 0}});
+  scene.add_mesh(
+      {{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}, {"indices", indices}, {"material", 0}});
   scene.root["nodes"].push_back({{"camera", 0}, {"translation", {1, 2, 3}}});
   scene.root["scenes"] = {{{"nodes", {0, 1}}}};
   return scene;

@@ -42,7 +42,8 @@ struct GltfScene {
   std::string put_glb(MemoryFileSystem& fs) const;
 };
 
-/// One triangle (0,0,0) (1,0,0) (0,1,0) with 16-bit indices, a normal, a material with a texture, a camera, a light.
+/// One triangle (0,0,0) (1,0,0) (0,1,0) with 16-bit indices, a normal, a material with a texture, a camera, a
+/// light.
 GltfScene triangle_scene();
 
 /// Loads scene.gltf; the error's message when that fails.

@@ -160,7 +160,8 @@ TEST(HdrImage, ReadsFlatRadiancePixels) {
 
 TEST(HdrImage, ReadsOldRunLengths) {
   // One pixel, repeated 2 times, then 1 * 256 + 0 by two counts: 1 + 2 + 1 + 256.
-  const auto image = read_radiance("-Y 1 +X 260", {128, 0, 0, 129, 1, 1, 1, 2, 0, 128, 0, 129, 1, 1, 1, 0, 1, 1, 1, 1});
+  const auto image =
+      read_radiance("-Y 1 +X 260", {128, 0, 0, 129, 1, 1, 1, 2, 0, 128, 0, 129, 1, 1, 1, 0, 1, 1, 1, 1});
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_EQ(image.value().rgb[0], 1);
   EXPECT_EQ(image.value().rgb[3 * 2], 1);
@@ -181,13 +182,13 @@ TEST(HdrImage, ReadsNewRunLengths) {
 
 TEST(HdrImage, RefusesBrokenRadianceFiles) {
   EXPECT_FALSE(read_radiance("-Y 1 +X 3", {128, 64, 0, 129}).ok());
-  EXPECT_FALSE(read_radiance("-Y 1 +X 2", {1, 1, 1, 2}).ok());                      // repeats nothing
-  EXPECT_FALSE(read_radiance("-Y 1 +X 2", {5, 5, 5, 5, 1, 1, 1, 200}).ok());        // repeats too often
-  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 9, 136, 128}).ok());            // another width
-  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 8, 137, 128}).ok());            // a run past the end
-  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 8, 0, 0, 0, 0}).ok());          // a run of nothing
+  EXPECT_FALSE(read_radiance("-Y 1 +X 2", {1, 1, 1, 2}).ok());                // repeats nothing
+  EXPECT_FALSE(read_radiance("-Y 1 +X 2", {5, 5, 5, 5, 1, 1, 1, 200}).ok());  // repeats too often
+  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 9, 136, 128}).ok());      // another width
+  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 8, 137, 128}).ok());      // a run past the end
+  EXPECT_FALSE(read_radiance("-Y 1 +X 8", {2, 2, 0, 8, 0, 0, 0, 0}).ok());    // a run of nothing
   EXPECT_FALSE(read_radiance("-Y 0 +X 8", {}).ok());
-  EXPECT_FALSE(read_radiance("-Y 4000 +X 4000", {}).ok());                          // over the budget
+  EXPECT_FALSE(read_radiance("-Y 4000 +X 4000", {}).ok());  // over the budget
   EXPECT_FALSE(read_radiance("-Y 99999999999 +X 1", {}).ok());
   EXPECT_FALSE(read_radiance("+X 1 -Y 1", {1, 2, 3, 4}).ok());
 }

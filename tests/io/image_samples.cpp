@@ -2,10 +2,11 @@
 
 #include <png.h>
 
-#include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
+// clang-format off: jpeglib.h needs <cstdio> before it
 #include <jpeglib.h>
+// clang-format on
 
 namespace shoal {
 
@@ -22,8 +23,9 @@ std::vector<std::byte> make_png(uint32_t width, uint32_t height, int color_type,
         target.insert(target.end(), reinterpret_cast<std::byte*>(data), reinterpret_cast<std::byte*>(data) + n);
       },
       [](png_structp) {});
-  png_set_IHDR(png, info, width, height, bit_depth, color_type, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, width, height, bit_depth, color_type,
+               interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
   std::vector<png_color> colors;
   for (size_t i = 0; i + 2 < palette.size(); i += 3) colors.push_back({palette[i], palette[i + 1], palette[i + 2]});
   if (!colors.empty()) png_set_PLTE(png, info, colors.data(), static_cast<int>(colors.size()));

@@ -7,8 +7,8 @@
 
 namespace shoal {
 
-/// A PNG of rows of `bytes` as they go to libpng (16-bit big-endian, packed below 8 bits). `palette` is RGB RGB ...,
-/// `transparent` a tRNS of palette alphas, or for other colour types non-empty for the colour 0.
+/// A PNG of rows of `bytes` as they go to libpng (16-bit big-endian, packed below 8 bits). `palette` is RGB RGB
+/// ..., `transparent` a tRNS of palette alphas, or for other colour types non-empty for the colour 0.
 std::vector<std::byte> make_png(uint32_t width, uint32_t height, int color_type, int bit_depth, bool interlaced,
                                 const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& palette = {},
                                 const std::vector<uint8_t>& transparent = {});

@@ -44,8 +44,10 @@ std::array<uint8_t, 4> expected_rgba(int color_type, const std::vector<uint8_t>&
 
 TEST(DecodeImage, ReadsEveryColourTypeOfPngAt8And16BitsInterlacedOrNot) {
   constexpr uint32_t kWidth = 13, kHeight = 11;
-  const std::pair<int, size_t> kinds[] = {
-      {PNG_COLOR_TYPE_GRAY, 1}, {PNG_COLOR_TYPE_GRAY_ALPHA, 2}, {PNG_COLOR_TYPE_RGB, 3}, {PNG_COLOR_TYPE_RGB_ALPHA, 4}};
+  const std::pair<int, size_t> kinds[] = {{PNG_COLOR_TYPE_GRAY, 1},
+                                          {PNG_COLOR_TYPE_GRAY_ALPHA, 2},
+                                          {PNG_COLOR_TYPE_RGB, 3},
+                                          {PNG_COLOR_TYPE_RGB_ALPHA, 4}};
   for (const auto& [type, samples_per_pixel] : kinds) {
     for (const int bits : {8, 16}) {
       for (const bool interlaced : {false, true}) {
