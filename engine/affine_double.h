@@ -30,8 +30,8 @@ struct AffineDouble {
 
 AffineDouble multiply(const AffineDouble& a, const AffineDouble& b);
 double determinant(const AffineDouble& a);
-/// The linear part's cofactors, as columns, with no translation: determinant * inverse transpose, defined for singular
-/// maps too. It carries the normals of planes, up to sign and length.
+/// The linear part's cofactors, as columns, with no translation: determinant * inverse transpose, defined for
+/// singular maps too. It carries the normals of planes, up to sign and length.
 AffineDouble cofactors(const AffineDouble& a);
 /// Requires: determinant(a) != 0. The result may hold infinities when `a` is nearly singular: see finite().
 AffineDouble inverse(const AffineDouble& a);

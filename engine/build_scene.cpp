@@ -83,9 +83,8 @@ class SceneBuilder {
     }
     const uint64_t needed = largest + kFixedBuildBytes;
     if (needed <= options_.max_memory_bytes) return {};
-    return Error{ErrorCode::kMemoryCap,
-                 fmt::format("{}: building needs {} MiB at least, the memory cap is {} MiB", path_,
-                             (needed >> 20) + 1, options_.max_memory_bytes >> 20)};
+    return Error{ErrorCode::kMemoryCap, fmt::format("{}: building needs {} MiB at least, the memory cap is {} MiB",
+                                                    path_, (needed >> 20) + 1, options_.max_memory_bytes >> 20)};
   }
 
   Status store_textures(gltf::BufferFiles& files, PageFileWriter& writer, CoverageTextures& coverage) {
@@ -110,8 +109,7 @@ class SceneBuilder {
       progress("building", static_cast<double>(read_triangles_) / static_cast<double>(total_triangles_));
       BuiltObject built;
       if (soup.size() > 0) {
-        SHOAL_ASSIGN_OR_RETURN(
-            built, build_object(std::move(soup), {options_.treelet_bytes}, &coverage, sink));
+        SHOAL_ASSIGN_OR_RETURN(built, build_object(std::move(soup), {options_.treelet_bytes}, &coverage, sink));
       }
       report_.triangles_count += built.triangles_count;
       report_.degenerate_count += built.degenerate_count;
@@ -150,8 +148,8 @@ class SceneBuilder {
       report_.warnings.push_back(fmt::format("an instance of {} is left out: its matrix has no inverse", name));
       return {};
     }
-    SHOAL_RETURN_IF_ERROR(append_emitters(emitters_of_[object], placed->instance,
-                                          static_cast<uint32_t>(placed_.size()), emitters_));
+    SHOAL_RETURN_IF_ERROR(
+        append_emitters(emitters_of_[object], placed->instance, static_cast<uint32_t>(placed_.size()), emitters_));
     report_.instanced_triangles_count += built_[object].triangles_count;
     placed_.push_back(*placed);
     return {};
@@ -170,7 +168,8 @@ class SceneBuilder {
       }
     }
     if (placed_.empty()) {
-      return Error{ErrorCode::kInput, fmt::format("{}: expected triangles to draw, found none in the scene", path_)};
+      return Error{ErrorCode::kInput,
+                   fmt::format("{}: expected triangles to draw, found none in the scene", path_)};
     }
     report_.instances_count = placed_.size();
     report_.objects_count = built_.size();

@@ -14,14 +14,14 @@
 namespace shoal {
 
 struct BuildProgress {
-  const char* stage = "";   ///< "reading", "building", "textures", "writing"
-  double fraction = 0;      ///< of the stage
+  const char* stage = "";  ///< "reading", "building", "textures", "writing"
+  double fraction = 0;     ///< of the stage
 };
 
 struct SceneBuildOptions {
   uint32_t treelet_bytes = 256u << 10;
-  unsigned threads = 0;          ///< 0: all
-  uint64_t max_memory_bytes = 0; ///< 0: no cap; else a scene that needs more is refused before it is read
+  unsigned threads = 0;           ///< 0: all
+  uint64_t max_memory_bytes = 0;  ///< 0: no cap; else a scene that needs more is refused before it is read
   gltf::Limits limits;
   std::function<void(const BuildProgress&)> progress;  ///< may be empty; called from the building thread
 };
@@ -40,7 +40,8 @@ struct SceneBuildReport {
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
                                      const SceneBuildOptions& options);
 
-/// Hash of everything a build depends on: JSON, sizes and modification times of the files it names, options, version.
+/// Hash of everything a build depends on: JSON, sizes and modification times of the files it names, options,
+/// version.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

@@ -33,7 +33,8 @@ bool leaf_in_page(std::span<const std::byte> bytes, uint64_t offset_bytes) {
   const float* positions = at<float>(bytes, header.leaves_offset + offset_bytes + sizeof(LeafHeader));
   if (!std::all_of(positions, positions + 3 * vertices, [](float v) { return std::isfinite(v); })) return false;
   const uint8_t* corners = at<uint8_t>(bytes, header.leaves_offset + corners_bytes);
-  if (std::any_of(corners, corners + 3 * triangles, [&](uint8_t corner) { return corner >= vertices; })) return false;
+  if (std::any_of(corners, corners + 3 * triangles, [&](uint8_t corner) { return corner >= vertices; }))
+    return false;
   return true;
 }
 
@@ -50,14 +51,18 @@ class PageChecker {
 
   Status run() const {
     switch (record_.kind) {
-      case PageKind::kTreelet: return treelet();
-      case PageKind::kAttributes: return attributes();
+      case PageKind::kTreelet:
+        return treelet();
+      case PageKind::kAttributes:
+        return attributes();
       case PageKind::kTexture:
         if (bytes_.size() != kTextureTileBytes) {
-          return corrupt(fmt::format("texture tile: expected {} bytes, found {}", kTextureTileBytes, bytes_.size()));
+          return corrupt(
+              fmt::format("texture tile: expected {} bytes, found {}", kTextureTileBytes, bytes_.size()));
         }
         return {};
-      case PageKind::kTable: return {};
+      case PageKind::kTable:
+        return {};
     }
     return corrupt("expected a known kind of page");
   }

@@ -17,8 +17,6 @@ namespace shoal {
 
 namespace {
 
-
-
 bool finite(std::span<const float> values) {
   return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
 }
@@ -38,7 +36,8 @@ class TableChecker {
     SHOAL_RETURN_IF_ERROR(header());
     SHOAL_RETURN_IF_ERROR(each("treelets", scene_.treelets, [&](size_t i) { return treelet(i); }));
     SHOAL_RETURN_IF_ERROR(each("textures", scene_.textures, [&](size_t i) { return texture(scene_.textures[i]); }));
-    SHOAL_RETURN_IF_ERROR(each("materials", scene_.materials, [&](size_t i) { return material(scene_.materials[i]); }));
+    SHOAL_RETURN_IF_ERROR(
+        each("materials", scene_.materials, [&](size_t i) { return material(scene_.materials[i]); }));
     SHOAL_RETURN_IF_ERROR(each("emitters", scene_.emitters, [&](size_t i) { return emitter(i); }));
     SHOAL_RETURN_IF_ERROR(each("lights", scene_.lights, [&](size_t i) { return light(scene_.lights[i]); }));
     return each("cameras", scene_.cameras, [&](size_t i) { return camera(scene_.cameras[i]); });
@@ -80,7 +79,8 @@ class TableChecker {
     const TreeletPages& t = scene_.treelets[i];
     if (!page_is(t.geometry, PageKind::kTreelet)) return "the id of a geometry page";
     if (i > 0 && t.geometry <= scene_.treelets[i - 1].geometry) return "geometry pages to ascend";
-    if (t.attributes != kNoPage && (t.attributes != t.geometry + 1 || !page_is(t.attributes, PageKind::kAttributes))) {
+    if (t.attributes != kNoPage &&
+        (t.attributes != t.geometry + 1 || !page_is(t.attributes, PageKind::kAttributes))) {
       return "its attribute page to follow its geometry page";
     }
     return nullptr;
@@ -88,7 +88,8 @@ class TableChecker {
 
   const char* texture(const Texture& t) {
     constexpr uint32_t kMaxSide = 1u << (kMaxTextureLevels - 1);
-    if (t.width == 0 || t.height == 0 || t.width > kMaxSide || t.height > kMaxSide) return "1 to 65536 texels a side";
+    if (t.width == 0 || t.height == 0 || t.width > kMaxSide || t.height > kMaxSide)
+      return "1 to 65536 texels a side";
     if (t.level_count != full_level_count(t.width, t.height)) return "a full pyramid of levels";
     if (t.wrap_u > WrapMode::kClampToEdge || t.wrap_v > WrapMode::kClampToEdge) return "a known wrap mode";
     if (t.srgb > 1 || t.nearest > 1) return "flags of 0 or 1";
@@ -115,12 +116,12 @@ class TableChecker {
       if (const char* expected = slot(s)) return expected;
     }
     const float unit[] = {m.base_color[0], m.base_color[1], m.base_color[2], m.base_color[3],
-                          m.metallic, m.roughness, m.specular, m.dielectric_f0};
+                          m.metallic,      m.roughness,     m.specular,      m.dielectric_f0};
     for (const float v : unit) {
       if (!(v >= 0 && v <= 1)) return "factors in [0, 1]";
     }
-    const float positive[] = {m.emissive[0], m.emissive[1], m.emissive[2], m.specular_color[0], m.specular_color[1],
-                              m.specular_color[2], m.alpha_cutoff, m.emission_weight};
+    const float positive[] = {m.emissive[0],       m.emissive[1],       m.emissive[2],  m.specular_color[0],
+                              m.specular_color[1], m.specular_color[2], m.alpha_cutoff, m.emission_weight};
     for (const float v : positive) {
       if (!(v >= 0) || !std::isfinite(v)) return "finite factors that are not negative";
     }
@@ -135,7 +136,8 @@ class TableChecker {
     if (!finite(e.uv)) return "finite uv";
     if (i == 0) return nullptr;
     const Emitter& before = scene_.emitters[i - 1];
-    const bool ascends = before.instance < e.instance || (before.instance == e.instance && before.primitive < e.primitive);
+    const bool ascends =
+        before.instance < e.instance || (before.instance == e.instance && before.primitive < e.primitive);
     return ascends ? nullptr : "ascending (instance, primitive)";
   }
 

@@ -1,5 +1,5 @@
-// The checks of a .shoal file's tables and pages against each other: after check_tables() no reader can index outside
-// anything, whatever bytes the file holds. Called by engine/open_scene. Cost: one pass over the tables.
+// The checks of a .shoal file's tables and pages against each other: after check_tables() no reader can index
+// outside anything, whatever bytes the file holds. Called by engine/open_scene. Cost: one pass over the tables.
 #pragma once
 
 #include "engine/scene.h"

@@ -21,9 +21,12 @@ std::string material_name(const gltf::Document& document, uint32_t material) {
 
 WrapMode wrap_mode(uint32_t gl_enum) {
   switch (gl_enum) {
-    case 33071: return WrapMode::kClampToEdge;
-    case 33648: return WrapMode::kMirroredRepeat;
-    default: return WrapMode::kRepeat;
+    case 33071:
+      return WrapMode::kClampToEdge;
+    case 33648:
+      return WrapMode::kMirroredRepeat;
+    default:
+      return WrapMode::kRepeat;
   }
 }
 
@@ -42,9 +45,15 @@ Material convert_factors(const gltf::Material& in) {
   out.normal_scale = clamped_float(in.normal_scale, -kFloatMax, kFloatMax);
   out.alpha_cutoff = clamped_float(in.alpha_cutoff, 0, kFloatMax);
   switch (in.alpha_mode) {
-    case gltf::AlphaMode::kOpaque: out.coverage = CoverageMode::kOpaque; break;
-    case gltf::AlphaMode::kMask: out.coverage = CoverageMode::kMask; break;
-    case gltf::AlphaMode::kBlend: out.coverage = CoverageMode::kBlend; break;
+    case gltf::AlphaMode::kOpaque:
+      out.coverage = CoverageMode::kOpaque;
+      break;
+    case gltf::AlphaMode::kMask:
+      out.coverage = CoverageMode::kMask;
+      break;
+    case gltf::AlphaMode::kBlend:
+      out.coverage = CoverageMode::kBlend;
+      break;
   }
   return out;
 }
@@ -62,8 +71,8 @@ class SlotPlanner {
     const bool emits = out.emissive[0] > 0 || out.emissive[1] > 0 || out.emissive[2] > 0;
     const bool glossy = out.roughness > 0 || out.metallic > 0;
     SHOAL_RETURN_IF_ERROR(slot(in.base_color_texture, true, true, out.base_color_texture));
-    SHOAL_RETURN_IF_ERROR(slot(in.metallic_roughness_texture, reflects && glossy, false,
-                               out.metallic_roughness_texture));
+    SHOAL_RETURN_IF_ERROR(
+        slot(in.metallic_roughness_texture, reflects && glossy, false, out.metallic_roughness_texture));
     SHOAL_RETURN_IF_ERROR(slot(in.normal_texture, out.normal_scale != 0, false, out.normal_texture));
     SHOAL_RETURN_IF_ERROR(slot(in.emissive_texture, emits, true, out.emissive_texture));
     SHOAL_RETURN_IF_ERROR(slot(in.specular_texture, specular, false, out.specular_texture));
@@ -79,8 +88,9 @@ class SlotPlanner {
     if (!info || !wanted) return {};
     const gltf::Texture& texture = document_.textures[info->texture];
     if (!texture.image) {
-      plan_.warnings.push_back(fmt::format("{}: textures[{}] has no image that can be read; its factor is used alone",
-                                           material_name(document_, material_), info->texture));
+      plan_.warnings.push_back(
+          fmt::format("{}: textures[{}] has no image that can be read; its factor is used alone",
+                      material_name(document_, material_), info->texture));
       return {};
     }
     SHOAL_ASSIGN_OR_RETURN(out.uv_set, uv_set(info->texcoord));
@@ -94,9 +104,8 @@ class SlotPlanner {
       if (sets.texcoord[i] == texcoord) return i;
     }
     if (sets.count == kMaxUvSets) {
-      return Error{ErrorCode::kInput,
-                   fmt::format("{}: {}: expected at most {} texture coordinate sets, found more", document_.path,
-                               material_name(document_, material_), kMaxUvSets)};
+      return Error{ErrorCode::kInput, fmt::format("{}: {}: expected at most {} texture coordinate sets, found more",
+                                                  document_.path, material_name(document_, material_), kMaxUvSets)};
     }
     sets.texcoord[sets.count] = texcoord;
     return sets.count++;

@@ -1,7 +1,6 @@
-// Where the builder of treelets finds coverage: the materials' alpha modes, and the alpha channel of every mip level of
-// the textures that need it, held in memory during the build only.
-// Filled by engine/tile_textures, read by treelets/build_object from any thread once filled.
-// Cost: 4/3 byte a texel of level 0.
+// Where the builder of treelets finds coverage: the materials' alpha modes, and the alpha channel of every mip
+// level of the textures that need it, held in memory during the build only. Filled by engine/tile_textures, read by
+// treelets/build_object from any thread once filled. Cost: 4/3 byte a texel of level 0.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +28,8 @@ class CoverageTextures : public CoverageSource {
   MaterialCoverage coverage(uint32_t material) const override { return coverage_[material]; }
   uint32_t level_count(uint32_t texture) const override { return static_cast<uint32_t>(levels_[texture].size()); }
   void level_size(uint32_t texture, uint32_t level, uint32_t* width, uint32_t* height) const override;
-  Status read_alpha(uint32_t texture, uint32_t level, uint32_t x, uint32_t y, std::span<uint8_t> out) const override;
+  Status read_alpha(uint32_t texture, uint32_t level, uint32_t x, uint32_t y,
+                    std::span<uint8_t> out) const override;
 
  private:
   std::vector<std::vector<AlphaLevel>> levels_;  // empty: opaque

@@ -39,7 +39,8 @@ SceneDescription describe_scene(const Scene& scene) {
   d.treelets_count = scene.treelets.size();
   d.instances_count = scene.top_tree.instance_count();
   d.top_nodes_count = scene.top_tree.nodes().size();
-  for (const Instance& i : scene.top_tree.instances()) d.objects_count = std::max<uint64_t>(d.objects_count, uint64_t{i.object} + 1);
+  for (const Instance& i : scene.top_tree.instances())
+    d.objects_count = std::max<uint64_t>(d.objects_count, uint64_t{i.object} + 1);
   d.materials_count = scene.materials.size();
   d.textures_count = scene.textures.size();
   d.emitters_count = scene.emitters.size();
@@ -47,7 +48,9 @@ SceneDescription describe_scene(const Scene& scene) {
   d.cameras_count = scene.cameras.size();
   for (const PageRecord& record : scene.file->records()) {
     switch (record.kind) {
-      case PageKind::kTable: d.table_bytes += record.raw_bytes; break;
+      case PageKind::kTable:
+        d.table_bytes += record.raw_bytes;
+        break;
       case PageKind::kTreelet:
         d.geometry_bytes += record.raw_bytes, d.geometry_stored_bytes += record.stored_bytes;
         break;
@@ -76,11 +79,13 @@ std::string scene_description_text(const Scene& scene) {
   if (build.contains("source") && build["source"].is_string()) {
     append_line(text, "source", build["source"].get<std::string>());
   }
-  append_line(text, "triangles", fmt::format("{} stored, {} with instances, {} degenerate left out", d.triangles_count,
-                                             d.instanced_triangles_count, d.degenerate_count));
+  append_line(text, "triangles",
+              fmt::format("{} stored, {} with instances, {} degenerate left out", d.triangles_count,
+                          d.instanced_triangles_count, d.degenerate_count));
   append_line(text, "objects", fmt::format("{} in {} instances", d.objects_count, d.instances_count));
-  append_line(text, "treelets", fmt::format("{} of about {} KiB, the largest {} KiB", d.treelets_count,
-                                            h.treelet_bytes >> 10, (h.largest_treelet_bytes + 1023) >> 10));
+  append_line(text, "treelets",
+              fmt::format("{} of about {} KiB, the largest {} KiB", d.treelets_count, h.treelet_bytes >> 10,
+                          (h.largest_treelet_bytes + 1023) >> 10));
   append_pages(text, "geometry", d.geometry_bytes, d.geometry_stored_bytes);
   append_pages(text, "attributes", d.attribute_bytes, d.attribute_stored_bytes);
   append_pages(text, "textures", d.texture_bytes, d.texture_stored_bytes);
@@ -92,8 +97,9 @@ std::string scene_description_text(const Scene& scene) {
   append_line(text, "materials", fmt::format("{}, with {} textures", d.materials_count, d.textures_count));
   append_line(text, "lights", fmt::format("{} emissive triangles, {} punctual", d.emitters_count, d.lights_count));
   append_line(text, "cameras", std::to_string(d.cameras_count));
-  append_line(text, "bounds", fmt::format("({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", h.bounds_lo[0], h.bounds_lo[1],
-                                          h.bounds_lo[2], h.bounds_hi[0], h.bounds_hi[1], h.bounds_hi[2]));
+  append_line(text, "bounds",
+              fmt::format("({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", h.bounds_lo[0], h.bounds_lo[1],
+                          h.bounds_lo[2], h.bounds_hi[0], h.bounds_hi[1], h.bounds_hi[2]));
   return text;
 }
 

@@ -13,11 +13,11 @@ struct SceneDescription {
   uint64_t triangles_count = 0, instanced_triangles_count = 0, degenerate_count = 0;
   uint64_t treelets_count = 0, instances_count = 0, objects_count = 0, top_nodes_count = 0;
   uint64_t materials_count = 0, textures_count = 0, emitters_count = 0, lights_count = 0, cameras_count = 0;
-  uint64_t geometry_bytes = 0, geometry_stored_bytes = 0;    ///< decoded, in the file
+  uint64_t geometry_bytes = 0, geometry_stored_bytes = 0;  ///< decoded, in the file
   uint64_t attribute_bytes = 0, attribute_stored_bytes = 0;
   uint64_t texture_bytes = 0, texture_stored_bytes = 0;
-  double geometry_bytes_per_triangle = 0;                    ///< decoded: what traversal keeps resident
-  double geometry_stored_bytes_per_triangle = 0;             ///< on disk
+  double geometry_bytes_per_triangle = 0;         ///< decoded: what traversal keeps resident
+  double geometry_stored_bytes_per_triangle = 0;  ///< on disk
   double attribute_bytes_per_triangle = 0, attribute_stored_bytes_per_triangle = 0;
 };
 

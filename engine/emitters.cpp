@@ -36,7 +36,8 @@ std::vector<Emitter> collect_emitters(const TriangleSoup& soup, std::span<const 
     const uint32_t set = material.emissive_texture.uv_set;
     if (material.emissive_texture.texture != kNoIndex && set < soup.layout.uv_count) {
       for (uint32_t k = 0; k < 3; ++k) {
-        std::copy_n(&soup.corners[(3 * i + k) * soup.layout.floats() + soup.layout.uv_offset(set)], 2, &e.uv[2 * k]);
+        std::copy_n(&soup.corners[(3 * i + k) * soup.layout.floats() + soup.layout.uv_offset(set)], 2,
+                    &e.uv[2 * k]);
       }
     }
     e.material = soup.material[i];
@@ -49,11 +50,13 @@ std::vector<Emitter> collect_emitters(const TriangleSoup& soup, std::span<const 
 Status append_emitters(std::span<const Emitter> of_object, const Instance& instance, uint32_t instance_index,
                        std::vector<Emitter>& out) {
   if (out.size() + of_object.size() > kMaxEmitters) {
-    return Error{ErrorCode::kInput, fmt::format("emissive triangles: expected at most {}, found more", kMaxEmitters)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("emissive triangles: expected at most {}, found more", kMaxEmitters)};
   }
   for (Emitter e : of_object) {
     for (int k = 0; k < 3 && !instance.identity; ++k) {
-      const Vec3 p = instance.object_to_world.point({e.position[3 * k], e.position[3 * k + 1], e.position[3 * k + 2]});
+      const Vec3 p =
+          instance.object_to_world.point({e.position[3 * k], e.position[3 * k + 1], e.position[3 * k + 2]});
       e.position[3 * k] = p.x, e.position[3 * k + 1] = p.y, e.position[3 * k + 2] = p.z;
     }
     e.instance = instance_index;

@@ -86,9 +86,15 @@ std::vector<PunctualLight> convert_lights(const gltf::Document& document, const 
     const gltf::Light& light = document.lights[item.index];
     PunctualLight out = {};
     switch (light.type) {
-      case gltf::LightType::kDirectional: out.type = PunctualType::kDirectional; break;
-      case gltf::LightType::kPoint: out.type = PunctualType::kPoint; break;
-      case gltf::LightType::kSpot: out.type = PunctualType::kSpot; break;
+      case gltf::LightType::kDirectional:
+        out.type = PunctualType::kDirectional;
+        break;
+      case gltf::LightType::kPoint:
+        out.type = PunctualType::kPoint;
+        break;
+      case gltf::LightType::kSpot:
+        out.type = PunctualType::kSpot;
+        break;
     }
     // The light goes along the node's -z axis (KHR_lights_punctual); a node squashed along z keeps the default.
     Vec3d way = normalized_or_zero(item.to_world.vector({0, 0, -1}));

@@ -19,7 +19,9 @@ Footprint footprint(uint32_t i, uint32_t fine, uint32_t coarse) {
   if (fine == coarse) return {i, 1, {1, 0, 0}};
   if (fine == 2 * coarse) return {2 * i, 2, {0.5f, 0.5f, 0}};
   const float n = static_cast<float>(fine);
-  return {2 * i, 3, {static_cast<float>(coarse - i) / n, static_cast<float>(coarse) / n, static_cast<float>(i + 1) / n}};
+  return {2 * i,
+          3,
+          {static_cast<float>(coarse - i) / n, static_cast<float>(coarse) / n, static_cast<float>(i + 1) / n}};
 }
 
 }  // namespace
@@ -102,8 +104,8 @@ void MipPyramid::quantize() {
   level_.rgba.resize(linear_.size());
   for (size_t i = 0; i < linear_.size(); ++i) {
     const bool encoded = srgb_ && (i & 3) != 3;
-    level_.rgba[i] = encoded ? srgb.to_code(linear_[i])
-                             : static_cast<uint8_t>(std::min(linear_[i], 1.0f) * 255.0f + 0.5f);
+    level_.rgba[i] =
+        encoded ? srgb.to_code(linear_[i]) : static_cast<uint8_t>(std::min(linear_[i], 1.0f) * 255.0f + 0.5f);
   }
 }
 

@@ -1,6 +1,8 @@
-// The mip levels of one picture, each texel the mean of exactly the area that it covers (odd sizes are weighted), in
-// linear light. Called by engine/tile_textures, one picture at a time.
-// Cost: about 10 bytes a texel of level 0 beside the picture itself; one pass a level.
+// The mip levels of one picture: each texel is the mean of the area that it covers in the level before, in linear
+// light. At odd sizes the texels at its edges count by their share (as in Guthe and Heckbert 2005,
+// "Non-Power-of-Two Mipmap Creation"), so that every texel of level 0 counts alike in 1 x 1. Called by
+// engine/tile_textures, one picture at a time. Cost: about 10 bytes a texel of level 0 beside the picture itself;
+// one pass a level.
 #pragma once
 
 #include <cstdint>

@@ -24,8 +24,8 @@ Result<std::vector<T>> read_rows(const PageFile& file, TableId table, const char
                                                   file.path(), name, sizeof(T), bytes.size())};
   }
   if (bytes.size() / sizeof(T) >= kNoIndex) {
-    return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected at most {} rows, found {}", file.path(),
-                                                  name, kNoIndex - 1, bytes.size() / sizeof(T))};
+    return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected at most {} rows, found {}",
+                                                  file.path(), name, kNoIndex - 1, bytes.size() / sizeof(T))};
   }
   std::vector<T> rows(bytes.size() / sizeof(T));
   if (!bytes.empty()) std::memcpy(static_cast<void*>(rows.data()), bytes.data(), bytes.size());

@@ -87,8 +87,8 @@ std::optional<PlacedInstance> place_instance(uint32_t object, const Bounds3& obj
   const double growth = absolute_row_sum(map, back);
   instance.transform_error = static_cast<float>(growth);
   placed.bounds = world_bounds(object_bounds, map, growth);
-  const bool usable = finite(back) && finite(widened(instance.world_to_object)) && std::isfinite(instance.transform_error) &&
-                      finite(placed.bounds);
+  const bool usable = finite(back) && finite(widened(instance.world_to_object)) &&
+                      std::isfinite(instance.transform_error) && finite(placed.bounds);
   if (!usable || determinant(widened(instance.world_to_object)) == 0) return std::nullopt;
   return placed;
 }

@@ -9,11 +9,13 @@ namespace {
 constexpr uint64_t kMaxTriangles = 0xfffffffeu;  // ids below kNoIndex
 
 bool draws_triangles(const gltf::Primitive& primitive) {
-  return primitive.mode == gltf::PrimitiveMode::kTriangles || primitive.mode == gltf::PrimitiveMode::kTriangleStrip ||
+  return primitive.mode == gltf::PrimitiveMode::kTriangles ||
+         primitive.mode == gltf::PrimitiveMode::kTriangleStrip ||
          primitive.mode == gltf::PrimitiveMode::kTriangleFan;
 }
 
-void note_material(const gltf::Document& document, const gltf::Primitive& primitive, std::vector<MaterialUse>& uses) {
+void note_material(const gltf::Document& document, const gltf::Primitive& primitive,
+                   std::vector<MaterialUse>& uses) {
   MaterialUse& use = primitive.material ? uses[*primitive.material] : uses.back();
   use.used = true;
   const auto color = primitive.attributes.find("COLOR_0");
@@ -41,7 +43,8 @@ void group_objects(GeometryPlan& plan) {
 
 }  // namespace
 
-Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document, const FlatScene& scene) {
+Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document,
+                                   const FlatScene& scene) {
   GeometryPlan plan;
   plan.meshes.resize(document.meshes.size());
   plan.uses.resize(document.materials.size() + 1);
@@ -59,9 +62,10 @@ Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Documen
       SHOAL_ASSIGN_OR_RETURN(const auto stream, gltf::TriangleStream::open(files, document, primitive));
       if (stream.count() == 0) continue;
       if (stream.count() > kMaxTriangles - triangles) {
-        return Error{ErrorCode::kInput,
-                     fmt::format("{}: meshes[{}].primitives[{}]: expected at most {} triangles in the scene, found more",
-                                 document.path, m, p, kMaxTriangles)};
+        return Error{
+            ErrorCode::kInput,
+            fmt::format("{}: meshes[{}].primitives[{}]: expected at most {} triangles in the scene, found more",
+                        document.path, m, p, kMaxTriangles)};
       }
       plan.meshes[m].primitives.push_back({m, p, stream.count(), static_cast<uint32_t>(triangles)});
       triangles += stream.count();
@@ -69,7 +73,8 @@ Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Documen
     }
   }
   if (others > 0) {
-    plan.warnings.push_back(fmt::format("{} primitives of points or lines are left out: only triangles are drawn", others));
+    plan.warnings.push_back(
+        fmt::format("{} primitives of points or lines are left out: only triangles are drawn", others));
   }
   group_objects(plan);
   return plan;

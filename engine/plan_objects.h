@@ -1,7 +1,7 @@
-// Which triangles become which object, before any of them is read. A mesh that one node shows is baked into the world
-// object (object 0, instance 0, identity); a mesh that several nodes show is an object of its own, stored once and
-// instanced, however small it is: treelets hold small objects well, and a rule without sizes is easy to predict.
-// Called by engine/build_scene. Cost: nothing is read but accessor counts.
+// Which triangles become which object, before any of them is read. A mesh that one node shows is baked into the
+// world object (object 0, instance 0, identity); a mesh that several nodes show is an object of its own, stored
+// once and instanced, however small it is: treelets hold small objects well, and a rule without sizes is easy to
+// predict. Called by engine/build_scene. Cost: nothing is read but accessor counts.
 #pragma once
 
 #include <vector>
@@ -31,7 +31,8 @@ struct GeometryPlan {
 
 /// Global primitive ids count (mesh in document order, primitive, triangle) over the meshes shown.
 /// Fails with: kInput (more triangles than ids, a primitive's accessors).
-Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document, const FlatScene& scene);
+Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document,
+                                   const FlatScene& scene);
 
 CornerLayout object_layout(const gltf::Document& document, const GeometryPlan& geometry, const ObjectPlan& object,
                            const MaterialPlan& materials);

@@ -87,8 +87,12 @@ class PrimitiveAppender {
  public:
   PrimitiveAppender(const gltf::Document& document, const MaterialPlan& plan, const PrimitiveSource& source,
                     const AffineDouble* bake, TriangleSoup& soup, ReadCounts& counts)
-      : document_(document), plan_(plan), source_(source),
-        primitive_(document.meshes[source.mesh].primitives[source.primitive]), soup_(soup), counts_(counts) {
+      : document_(document),
+        plan_(plan),
+        source_(source),
+        primitive_(document.meshes[source.mesh].primitives[source.primitive]),
+        soup_(soup),
+        counts_(counts) {
     material_ = plan.material_of(primitive_);
     if (bake) points_ = *bake, moved_ = true;
     const double det = determinant(points_);
@@ -121,7 +125,8 @@ class PrimitiveAppender {
       const auto accessor = find_attribute(primitive_, name);
       if (!accessor) return {};
       const std::string place = fmt::format("meshes[{}].primitives[{}].{}", source_.mesh, source_.primitive, name);
-      SHOAL_ASSIGN_OR_RETURN(window, AttributeWindow::open(files, document_, *accessor, place, lo, hi, vertex_count));
+      SHOAL_ASSIGN_OR_RETURN(window,
+                             AttributeWindow::open(files, document_, *accessor, place, lo, hi, vertex_count));
       return {};
     };
     SHOAL_RETURN_IF_ERROR(open("POSITION", 3, 3, position_));
@@ -134,8 +139,9 @@ class PrimitiveAppender {
       const std::string name = fmt::format("TEXCOORD_{}", sets.texcoord[set]);
       SHOAL_RETURN_IF_ERROR(open(name, 2, 2, uv_[set]));
       if (!uv_[set]) {
-        counts_.warnings.push_back(fmt::format("meshes[{}].primitives[{}] lacks {}, which its material's textures use",
-                                               source_.mesh, source_.primitive, name));
+        counts_.warnings.push_back(
+            fmt::format("meshes[{}].primitives[{}] lacks {}, which its material's textures use", source_.mesh,
+                        source_.primitive, name));
       }
     }
     return {};

@@ -33,9 +33,9 @@ struct Scene {
 Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode, TraversalOptions traversal);
 
 /// The check that the page cache runs on every decoded page (treelet, attribute and texture pages): the page is
-/// well formed and fits the scene's tables (triangle counts, materials, the roots that the top tree enters), so that
-/// its readers need check nothing. `[&scene](auto& r, auto b) { return check_page(scene, r, b); }` is a PageCheck.
-/// Fails with: kCorrupt.
+/// well formed and fits the scene's tables (triangle counts, materials, the roots that the top tree enters), so
+/// that its readers need check nothing. `[&scene](auto& r, auto b) { return check_page(scene, r, b); }` is a
+/// PageCheck. Fails with: kCorrupt.
 Status check_page(const Scene& scene, const PageRecord& record, std::span<const std::byte> bytes);
 
 }  // namespace shoal

@@ -11,7 +11,7 @@
 namespace shoal {
 
 namespace tables {
-inline constexpr TableId kBuildRecord = 1;   ///< JSON text: version, source, options, counts (for people and `info`)
+inline constexpr TableId kBuildRecord = 1;   ///< JSON: version, source, options, counts (for people and `info`)
 inline constexpr TableId kSceneHeader = 2;   ///< one SceneHeader
 inline constexpr TableId kTopNodes = 3;      ///< TopNode[]
 inline constexpr TableId kEntries = 4;       ///< TreeletEntry[]

@@ -14,7 +14,8 @@ Result<TreeletId> TreeletPageSink::add(std::span<const std::byte> geometry, std:
   const size_t largest = std::max(geometry.size(), attributes.size());
   if (largest > kMaxPageBytes) {
     return Error{ErrorCode::kUsage, fmt::format("a treelet's page: expected at most {} bytes, found {}: choose a "
-                                                "smaller treelet size", kMaxPageBytes, largest)};
+                                                "smaller treelet size",
+                                                kMaxPageBytes, largest)};
   }
   TreeletHeader header;
   std::memcpy(&header, geometry.data(), sizeof(header));

@@ -14,8 +14,8 @@ namespace {
 constexpr uint64_t kMaxEncodedImageBytes = 1u << 30;
 constexpr uint32_t kMaxTextureSide = 1u << (kMaxTextureLevels - 1);
 
-Result<std::vector<std::byte>> encoded_image(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
-                                             const gltf::Image& image) {
+Result<std::vector<std::byte>> encoded_image(FileSystem& fs, gltf::BufferFiles& files,
+                                             const gltf::Document& document, const gltf::Image& image) {
   std::vector<std::byte> bytes;
   if (image.view) {
     const gltf::BufferView& view = document.views[*image.view];
@@ -77,7 +77,12 @@ class TextureTiler {
   TextureTiler(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
                const std::vector<TextureRequest>& requests, uint64_t max_pixels, PageFileWriter& writer,
                CoverageTextures& coverage)
-      : fs_(fs), files_(files), document_(document), requests_(requests), max_pixels_(max_pixels), writer_(writer),
+      : fs_(fs),
+        files_(files),
+        document_(document),
+        requests_(requests),
+        max_pixels_(max_pixels),
+        writer_(writer),
         coverage_(coverage) {
     out_.textures.resize(requests.size());
     out_.facts.resize(requests.size());
@@ -89,8 +94,9 @@ class TextureTiler {
     const gltf::Image& source = document_.images[first.image];
     auto decoded = decode(source);
     if (!decoded.ok()) {
-      return Error{decoded.error().code, fmt::format("{}: images[{}] ({}), used by {}: {}", document_.path,
-                                                     first.image, source.name, first.user, decoded.error().message)};
+      return Error{decoded.error().code,
+                   fmt::format("{}: images[{}] ({}), used by {}: {}", document_.path, first.image, source.name,
+                               first.user, decoded.error().message)};
     }
     Image8 image = std::move(decoded).value();
     std::vector<uint32_t> encoded[2];
@@ -165,8 +171,8 @@ Result<TiledTextures> tile_textures(FileSystem& fs, gltf::BufferFiles& files, co
   for (size_t i = 0; i < order.size();) {
     size_t end = i;
     while (end < order.size() && requests[order[end]].image == requests[order[i]].image) ++end;
-    SHOAL_RETURN_IF_ERROR(tiler.tile_image({order.begin() + static_cast<ptrdiff_t>(i),
-                                            order.begin() + static_cast<ptrdiff_t>(end)}));
+    SHOAL_RETURN_IF_ERROR(
+        tiler.tile_image({order.begin() + static_cast<ptrdiff_t>(i), order.begin() + static_cast<ptrdiff_t>(end)}));
     i = end;
     progress(static_cast<double>(i) / static_cast<double>(order.size()));
   }

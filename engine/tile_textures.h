@@ -1,6 +1,6 @@
-// Images to pages: each image that a material needs is decoded once, filtered into a mip pyramid and cut into 64 x 64
-// tiles, one kTexture page each. Textures that differ in their sampler only share pages.
-// Called by engine/build_scene from one thread. Cost: the decoder's, and 15 bytes a texel of one image at a time.
+// Images to pages: each image that a material needs is decoded once, filtered into a mip pyramid and cut into 64 x
+// 64 tiles, one kTexture page each. Textures that differ in their sampler only share pages. Called by
+// engine/build_scene from one thread. Cost: the decoder's, and 15 bytes a texel of one image at a time.
 #pragma once
 
 #include <functional>
@@ -14,19 +14,19 @@
 namespace shoal {
 
 inline constexpr uint32_t kTextureTileBytes = kTextureTileTexels * kTextureTileTexels * 4;
-/// Of an image while it is decoded, filtered and tiled: 4 decoded, 4 a copy for a second encoding, 4 + 1 float levels,
-/// rounded up.
+/// Of an image while it is decoded, filtered and tiled: 4 decoded, 4 a copy for a second encoding, 4 + 1 float
+/// levels, rounded up.
 inline constexpr uint64_t kImageScratchBytesPerPixel = 15;
 
 struct TiledTextures {
-  std::vector<Texture> textures;     ///< parallel to the requests
-  std::vector<TextureFacts> facts;   ///< likewise
-  uint64_t pages_bytes = 0;          ///< decoded
-  uint64_t source_bytes = 0;         ///< of encoded images
+  std::vector<Texture> textures;    ///< parallel to the requests
+  std::vector<TextureFacts> facts;  ///< likewise
+  uint64_t pages_bytes = 0;         ///< decoded
+  uint64_t source_bytes = 0;        ///< of encoded images
 };
 
-/// `progress` is called with the fraction done. Fails with: kInput (an image missing, broken or over a budget, named
-/// with the material that uses it), kStorage.
+/// `progress` is called with the fraction done. Fails with: kInput (an image missing, broken or over a budget,
+/// named with the material that uses it), kStorage.
 Result<TiledTextures> tile_textures(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
                                     const std::vector<TextureRequest>& requests, const gltf::Limits& limits,
                                     PageFileWriter& writer, CoverageTextures& coverage,

@@ -27,8 +27,8 @@ uint32_t add_grid(WrittenScene& scene, uint32_t n) {
       indices.insert(indices.end(), {a, b, d, a, d, c});
     }
   }
-  return scene.add_mesh({{"attributes", {{"POSITION", scene.add_floats(3, positions)}}},
-                         {"indices", scene.add_indices(indices)}});
+  return scene.add_mesh(
+      {{"attributes", {{"POSITION", scene.add_floats(3, positions)}}}, {"indices", scene.add_indices(indices)}});
 }
 
 TEST(BuildScene, BakesTheTransformOfAMeshThatOneNodeShows) {
@@ -149,7 +149,8 @@ TEST(BuildScene, CountsDegenerateTrianglesOfAStripInTheIds) {
   // 0 1 2 3 3 4 5: triangles 012, 213, 233 (degenerate), 334 (degenerate), 345
   const uint32_t positions = scene.add_floats(3, {0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 2, 0, 0, 2, 1, 0});
   const uint32_t indices = scene.add_indices({0, 1, 2, 3, 3, 4, 5});
-  scene.add_node({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}}, {"indices", indices}, {"mode", 5}})}});
+  scene.add_node(
+      {{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}}, {"indices", indices}, {"mode", 5}})}});
   scene.add_node({{"mesh", scene.add_triangle_mesh(9, 1)}});
   scene.save(fs);
   const BuiltScene built = build_and_open(fs);

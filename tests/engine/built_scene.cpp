@@ -81,9 +81,9 @@ BuiltScene build_and_open(FileSystem& fs, const SceneBuildOptions& options, cons
   if (built.report.triangles_count > read_back_limit) return built;
   std::vector<StoredTreelet> treelets;
   for (const TreeletPages& pages : built.scene.treelets) {
-    treelets.push_back({read_page(built.scene, pages.geometry),
-                        pages.attributes == kNoPage ? std::vector<std::byte>{}
-                                                    : read_page(built.scene, pages.attributes)});
+    treelets.push_back({read_page(built.scene, pages.geometry), pages.attributes == kNoPage
+                                                                    ? std::vector<std::byte>{}
+                                                                    : read_page(built.scene, pages.attributes)});
   }
   built.objects.resize(built.report.objects_count);
   for (const Instance& instance : built.scene.top_tree.instances()) {

@@ -65,7 +65,7 @@ WrittenScene::WrittenScene() {
 }
 
 uint32_t WrittenScene::add_accessor(const void* bytes, size_t size, uint32_t component_type, uint32_t components,
-                                 size_t count) {
+                                    size_t count) {
   binary_.resize((binary_.size() + 3) / 4 * 4);
   json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", size}});
   binary_.append(static_cast<const char*>(bytes), size);
@@ -85,7 +85,8 @@ uint32_t WrittenScene::add_indices(const std::vector<uint32_t>& values) {
 }
 
 uint32_t WrittenScene::add_bytes(uint32_t components, const std::vector<uint8_t>& values, bool normalized) {
-  const uint32_t accessor = add_accessor(values.data(), values.size(), 5121, components, values.size() / components);
+  const uint32_t accessor =
+      add_accessor(values.data(), values.size(), 5121, components, values.size() / components);
   json["accessors"][accessor]["normalized"] = normalized;
   return accessor;
 }
@@ -107,7 +108,7 @@ uint32_t WrittenScene::add_node(const nlohmann::json& node) {
 }
 
 uint32_t WrittenScene::add_texture(MemoryFileSystem& fs, uint32_t width, uint32_t height,
-                                const std::vector<uint8_t>& rgba) {
+                                   const std::vector<uint8_t>& rgba) {
   const std::string name = "image" + std::to_string(json.contains("images") ? json["images"].size() : 0) + ".png";
   fs.put(name, png_bytes(width, height, rgba));
   json["images"].push_back({{"uri", name}});
