@@ -102,6 +102,11 @@ uint64_t PageCache::minimum_capacity_bytes(const PageFile& file, unsigned thread
   return sum * threads;
 }
 
+uint64_t PageCache::overhead_bytes(const PageFile& file) {
+  // A vector that grows holds up to twice what it needs.
+  return file.page_count() * (sizeof(PageSlot) + 2 * sizeof(PageId) + 2 * sizeof(EvictionCandidate));
+}
+
 Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
   State& s = *state_;
   SHOAL_CHECK(page < s.file.page_count());

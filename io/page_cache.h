@@ -84,6 +84,9 @@ class PageCache {
   /// each pins one page of a kind at a time. Tables are not read through the cache.
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
 
+  /// Memory that the cache takes beside its capacity: its slots, and room to rank what is resident.
+  static uint64_t overhead_bytes(const PageFile& file);
+
   /// Fails with: kStorage, kCorrupt (after which the render ends), kMemoryCap (a page larger than the capacity). A
   /// thread that waited for another's read of the page counts a hit. Requires: page < page_count() of the file.
   Result<PagePin> pin(PageId page, CacheCounters& counters);

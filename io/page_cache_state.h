@@ -24,12 +24,14 @@ namespace shoal {
 ///   resident (kResident) --evict, under the lock, by compare and swap--> absent
 ///
 /// `data` and `place` change under the lock only, and `data` only while the page is absent.
-struct PageSlot {
+struct alignas(32) PageSlot {
   std::atomic<uint32_t> state{0};
-  uint32_t place = 0;                 // in State::residents
+  uint32_t bytes = 0;                 // decoded size, so that a hit touches this line only
   std::atomic<uint64_t> last_use{0};  // State::tick: even for a load, odd for a hit after it
   std::byte* data = nullptr;
+  uint32_t place = 0;  // in State::residents
 };
+static_assert(sizeof(PageSlot) == 32);
 inline constexpr uint32_t kResident = 1u << 31;
 
 /// A read under way. Threads that want the same page wait for it, and the loader pins the page for them.
@@ -45,9 +47,12 @@ struct PageCache::State {
         capacity_bytes(capacity),
         check(std::move(page_check)),
         waiting(std::move(waiting_work)),
-        slots(std::make_unique<PageSlot[]>(page_file.page_count())) {}
+        slots(std::make_unique<PageSlot[]>(page_file.page_count())) {
+    for (PageId page = 0; page < page_file.page_count(); ++page)
+      slots[page].bytes = page_file.record(page).raw_bytes;
+  }
 
-  uint32_t page_bytes(PageId page) const { return file.record(page).raw_bytes; }
+  uint32_t page_bytes(PageId page) const { return slots[page].bytes; }
   bool try_pin(PageId page);
   void release(PageId page);
 
