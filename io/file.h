@@ -48,6 +48,9 @@ class FileSystem {
   /// Atomic replace, then fsync of the directory. Fails with: kStorage.
   virtual Status rename(const std::string& from, const std::string& to) = 0;
   virtual Status remove(const std::string& path) = 0;
+  /// Makes a folder and those above it, unless they are there. A file system without folders has nothing to do.
+  /// Fails with: kStorage.
+  virtual Status create_folder(const std::string& path);
 };
 
 FileSystem& posix_file_system();

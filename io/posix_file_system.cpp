@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <system_error>
 
 #include "io/aligned_buffer.h"
@@ -220,9 +221,19 @@ class PosixFileSystem final : public FileSystem {
     }
     return {};
   }
+
+  Status create_folder(const std::string& path) override {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (!error && std::filesystem::is_directory(path, error)) return {};
+    return Error{ErrorCode::kStorage, fmt::format("cannot make folder {}: {}", path,
+                                                  error ? error.message() : "expected a folder, found a file")};
+  }
 };
 
 }  // namespace
+
+Status FileSystem::create_folder(const std::string&) { return {}; }
 
 FileSystem& posix_file_system() {
   static PosixFileSystem file_system;
