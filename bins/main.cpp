@@ -1,1 +1,72 @@
-int main() { return 0; }
+// shoal: one program, one subcommand a task (docs/design.md). Exit codes: ErrorCode, and 10 of `diff`.
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <new>
+
+#include "bins/command.h"
+#include "engine/render_report.h"
+
+namespace {
+
+void declare_console(CLI::App& app, shoal::Console& console, bool& quiet) {
+  static const std::map<std::string, shoal::LogLevel> kLevels{{"error", shoal::LogLevel::kError},
+                                                              {"warning", shoal::LogLevel::kWarning},
+                                                              {"info", shoal::LogLevel::kInfo},
+                                                              {"debug", shoal::LogLevel::kDebug}};
+  static const std::map<std::string, shoal::ProgressMode> kModes{{"auto", shoal::ProgressMode::kAuto},
+                                                                 {"bar", shoal::ProgressMode::kBar},
+                                                                 {"lines", shoal::ProgressMode::kLines},
+                                                                 {"json", shoal::ProgressMode::kJson},
+                                                                 {"none", shoal::ProgressMode::kNone}};
+  app.add_option("--log-level", console.level, "error, warning, info, debug")
+      ->transform(CLI::CheckedTransformer(kLevels))
+      ->type_name("LEVEL");
+  app.add_option("--progress", console.progress, "auto, bar, lines, json, none")
+      ->transform(CLI::CheckedTransformer(kModes))
+      ->type_name("MODE");
+  app.add_flag("--quiet", quiet, "errors only");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Shoal renders glTF scenes bigger than memory.", "shoal"};
+  app.set_version_flag("--version", "shoal " SHOAL_VERSION);
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 done, 1 a bug of ours, 2 usage, 3 input missing or invalid, 4 a required extension is not "
+             "supported,\n5 the memory cap cannot work, 6 disk full or I/O error, 7 a corrupt .shoal file, 9 stopped, "
+             "10 (diff) the pictures differ.");
+  shoal::Console console;
+  shoal::Command command;
+  shoal::declare_build(app, console, command);
+  shoal::declare_render(app, console, command);
+  shoal::declare_compare(app, console, command);
+  shoal::declare_info(app, console, command);
+  shoal::declare_verify(app, console, command);
+  shoal::declare_diff(app, console, command);
+  shoal::declare_generate(app, console, command);
+  bool quiet = false;
+  for (CLI::App* subcommand : app.get_subcommands([](CLI::App*) { return true; })) {
+    declare_console(*subcommand, console, quiet);
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(shoal::ErrorCode::kUsage);
+  }
+  if (quiet) console.level = shoal::LogLevel::kError, console.progress = shoal::ProgressMode::kNone;
+  return command();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    std::fputs("shoal: out of memory: lower --max-memory, so that the plan fits what the machine has\n", stderr);
+    return static_cast<int>(shoal::ErrorCode::kMemoryCap);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "shoal: internal error: %s\n", error.what());
+    return static_cast<int>(shoal::ErrorCode::kInternal);
+  }
+}

@@ -3,6 +3,7 @@
 add_library(shoal_flags INTERFACE)
 target_compile_options(shoal_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
   -fno-math-errno -fno-trapping-math)
+target_compile_definitions(shoal_flags INTERFACE SHOAL_VERSION="${PROJECT_VERSION}")
 target_include_directories(shoal_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_link_libraries(shoal_flags INTERFACE glm::glm)
 if(SHOAL_SCALAR)

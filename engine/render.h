@@ -62,6 +62,7 @@ struct RenderProgress {
 };
 
 struct RenderHooks {
+  std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
   std::function<void(const RenderProgress&)> progress;  ///< may be empty; called a few times a second from one thread
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
 };

@@ -1,0 +1,62 @@
+// shoal build: glTF to .shoal.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "bins/command.h"
+#include "bins/render_options.h"
+#include "engine/render_report.h"
+
+namespace shoal {
+namespace {
+
+struct BuildArguments {
+  std::string scene, output, treelet_size, max_memory;
+  unsigned threads = 0;
+};
+
+Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console) {
+  SceneBuildOptions options;
+  options.threads = arguments.threads;
+  if (!arguments.treelet_size.empty()) {
+    SHOAL_ASSIGN_OR_RETURN(options.treelet_bytes, parse_treelet_size(arguments.treelet_size));
+  }
+  if (!arguments.max_memory.empty()) {
+    SHOAL_ASSIGN_OR_RETURN(options.max_memory_bytes, parse_size(arguments.max_memory));
+  }
+  options.progress = build_progress(console);
+  return build_scene(posix_file_system(), arguments.scene, arguments.output, options);
+}
+
+int run_build(const BuildArguments& arguments, Console& console) {
+  const auto result = build(arguments, console);
+  console.end_progress();
+  if (!result.ok()) return console.error(result.error());
+  const SceneBuildReport& r = result.value();
+  for (const std::string& warning : r.warnings) console.warning(warning);
+  console.info(fmt::format("{}: {} triangles in {} treelets, {} instances of {} objects, {} ({:.1f} bytes a triangle), "
+                           "{:.1f} s, {:.2f} M triangles/s",
+                           arguments.output, r.triangles_count, r.treelets_count, r.instances_count, r.objects_count,
+                           format_bytes(r.file_bytes),
+                           static_cast<double>(r.file_bytes) / static_cast<double>(std::max<uint64_t>(r.triangles_count, 1)),
+                           r.seconds, static_cast<double>(r.triangles_count) / std::max(r.seconds, 1e-9) * 1e-6));
+  if (r.degenerate_count > 0) console.info(fmt::format("{} degenerate triangles skipped", r.degenerate_count));
+  return 0;
+}
+
+}  // namespace
+
+void declare_build(CLI::App& app, Console& console, Command& command) {
+  auto arguments = std::make_shared<BuildArguments>();
+  CLI::App* sub = app.add_subcommand("build", "scene to paged file");
+  sub->add_option("scene", arguments->scene, "a .gltf or .glb")->required();
+  sub->add_option("-o,--output", arguments->output, "the .shoal to write")->required();
+  sub->add_option("--treelet-size", arguments->treelet_size, "bytes of a treelet, 4K to 4M (default 256K)");
+  sub->add_option("--max-memory", arguments->max_memory, "cap on the whole process, such as 2G");
+  sub->add_option("--threads", arguments->threads, "threads; 0: all")->capture_default_str();
+  sub->callback([arguments, &console, &command] {
+    command = [arguments, &console] { return run_build(*arguments, console); };
+  });
+}
+
+}  // namespace shoal

@@ -1,0 +1,80 @@
+// shoal render: a picture of a scene.
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "bins/command.h"
+#include "bins/render_options.h"
+#include "engine/render_report.h"
+#include "engine/tonemap.h"
+
+namespace shoal {
+namespace {
+
+struct Arguments {
+  RenderArguments render;
+  std::string output, png, stats, tonemap = "pbr-neutral";
+  float exposure = 0;
+};
+
+Status write_preview(const Arguments& arguments, const ExrImage& image) {
+  SHOAL_ASSIGN_OR_RETURN(const ToneCurve curve, parse_tone_curve(arguments.tonemap));
+  const std::vector<uint8_t> rgb = tone_map_image(image.channels[0].values, image.channels[1].values,
+                                                  image.channels[2].values, {curve, arguments.exposure});
+  return write_png(posix_file_system(), arguments.png, image.width, image.height, rgb);
+}
+
+Status write_outputs(const Arguments& arguments, const PreparedRender& prepared, const RenderResult& result) {
+  const ExrImage image = picture_image(result, prepared.scene, prepared.picture);
+  SHOAL_RETURN_IF_ERROR(write_exr(posix_file_system(), arguments.output, image));
+  if (!arguments.png.empty()) SHOAL_RETURN_IF_ERROR(write_preview(arguments, image));
+  if (arguments.stats.empty()) return {};
+  const std::string json = stats_json(result, prepared.scene, prepared.picture, prepared.execution);
+  return write_whole_file(posix_file_system(), arguments.stats, std::as_bytes(std::span(json)));
+}
+
+int run_render(const Arguments& arguments, Console& console) {
+  if (const auto curve = parse_tone_curve(arguments.tonemap); !curve.ok()) return console.error(curve.error());
+  auto prepared = prepare_render(arguments.render, console);
+  if (!prepared.ok()) return console.error(prepared.error());
+  PreparedRender& p = prepared.value();
+  RenderHooks hooks = console_hooks(console);
+  hooks.planned = [&console](const MemoryPlan& plan) { console.info(describe_plan(plan)); };
+  const auto result = render(posix_file_system(), p.scene, p.picture, p.execution, hooks);
+  console.end_progress();
+  if (!result.ok()) return console.error(result.error());
+  const Status written = write_outputs(arguments, p, result.value());
+  if (!written.ok()) return console.error(written.error());
+  console.info(fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds));
+  if (result.value().counters.invalid_samples_count > 0) {
+    console.warning(fmt::format("{} contributions were not finite and were dropped",
+                                result.value().counters.invalid_samples_count));
+  }
+  if (console.level >= LogLevel::kInfo) {
+    fmt::print("{}", traffic_table({{std::string(order_name(p.execution.order)), &result.value()}}));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void declare_render(CLI::App& app, Console& console, Command& command) {
+  static const std::map<std::string, Order> kOrders{{"queued", Order::kQueued}, {"depth-first", Order::kDepthFirst}};
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* sub = app.add_subcommand("render", "scene to picture");
+  arguments->render.declare(*sub);
+  sub->add_option("-o,--output", arguments->output, "the picture, .exr")->required();
+  sub->add_option("--png", arguments->png, "a preview as well, 8-bit sRGB");
+  sub->add_option("--tonemap", arguments->tonemap, "of the preview: pbr-neutral, none")->capture_default_str();
+  sub->add_option("--exposure", arguments->exposure, "of the preview, in stops")->capture_default_str();
+  sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
+  sub->add_option("--order", arguments->render.execution.order, "queued, depth-first (the picture is the same)")
+      ->transform(CLI::CheckedTransformer(kOrders))
+      ->type_name("ORDER");
+  sub->callback([arguments, &console, &command] {
+    command = [arguments, &console] { return run_render(*arguments, console); };
+  });
+}
+
+}  // namespace shoal

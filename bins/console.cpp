@@ -1,0 +1,77 @@
+#include "bins/console.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "engine/process_memory.h"
+
+namespace shoal {
+namespace {
+
+constexpr double kSecondsBetweenLines = 5;
+
+double seconds_since_start() {
+  static const auto start = std::chrono::steady_clock::now();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string clock_text(double seconds) {
+  const auto whole = static_cast<uint64_t>(seconds);
+  return fmt::format("{:02}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+}  // namespace
+
+void Console::log(LogLevel line_level, std::string_view prefix, std::string_view message) {
+  if (line_level > level) return;
+  std::lock_guard guard(mutex_);
+  if (bar_open_) std::fputs("\n", stderr), bar_open_ = false;
+  fmt::print(stderr, "{} {:>6} MB | {}{}\n", clock_text(seconds_since_start()), resident_set_bytes() >> 20, prefix,
+             message);
+}
+
+int Console::error(const Error& error) {
+  end_progress();
+  fmt::print(stderr, "shoal: {}\n", error.message);
+  return static_cast<int>(error.code);
+}
+
+void Console::show_progress(std::string_view stage, double fraction, double seconds, std::string_view detail) {
+  ProgressMode mode = progress;
+  if (mode == ProgressMode::kAuto) mode = isatty(STDERR_FILENO) != 0 ? ProgressMode::kBar : ProgressMode::kLines;
+  if (mode == ProgressMode::kNone) return;
+  const double left = fraction > 0 ? seconds * (1 - fraction) / fraction : 0;
+  std::lock_guard guard(mutex_);
+  if (mode == ProgressMode::kBar) {
+    const int filled = static_cast<int>(fraction * 30);
+    fmt::print(stderr, "\r{:<9}[{:=<{}}{:{}}] {:5.1f} %  {} left  {} MB  {}\x1b[K", stage, "", filled, "", 30 - filled,
+               fraction * 100, clock_text(left), resident_set_bytes() >> 20, detail);
+    bar_open_ = true;
+    std::fflush(stderr);
+    return;
+  }
+  if (seconds - last_line_seconds_ < kSecondsBetweenLines && seconds >= last_line_seconds_) return;
+  last_line_seconds_ = seconds;
+  if (mode == ProgressMode::kJson) {
+    const nlohmann::ordered_json line{{"stage", stage},        {"fraction", fraction}, {"seconds", seconds},
+                                      {"seconds_left", left},  {"rss_bytes", resident_set_bytes()},
+                                      {"detail", detail}};
+    fmt::print(stderr, "{}\n", line.dump());
+  } else {
+    fmt::print(stderr, "{} {:>6} MB | {} {:.1f} %, {} left, {}\n", clock_text(seconds_since_start()),
+               resident_set_bytes() >> 20, stage, fraction * 100, clock_text(left), detail);
+  }
+}
+
+void Console::end_progress() {
+  std::lock_guard guard(mutex_);
+  if (bar_open_) std::fputs("\n", stderr);
+  bar_open_ = false;
+  last_line_seconds_ = -1e9;
+}
+
+}  // namespace shoal

@@ -1,0 +1,205 @@
+#include "bins/render_options.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <charconv>
+#include <cstdlib>
+#include <filesystem>
+
+#include "engine/render_report.h"
+#include "treelets/build_object.h"
+
+namespace shoal {
+namespace {
+
+std::atomic<bool> g_stop{false};  ///< the only global: a signal handler can reach nothing else
+
+void on_signal(int) { g_stop.store(true, std::memory_order_relaxed); }
+
+bool is_shoal_file(const std::string& path) { return path.ends_with(".shoal"); }
+
+std::filesystem::path default_cache_folder() {
+  if (const char* folder = std::getenv("XDG_CACHE_HOME"); folder != nullptr && *folder == '/') {
+    return std::filesystem::path(folder) / "shoal";
+  }
+  const char* home = std::getenv("HOME");
+  return std::filesystem::path(home != nullptr ? home : "/tmp") / ".cache" / "shoal";
+}
+
+/// The .shoal of a glTF: built into the cache folder unless it is there already.
+Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOptions options, Console& console) {
+  FileSystem& fs = posix_file_system();
+  SHOAL_ASSIGN_OR_RETURN(const uint64_t key, build_cache_key(fs, arguments.scene, options));
+  const std::filesystem::path folder =
+      arguments.cache_folder.empty() ? default_cache_folder() : std::filesystem::path(arguments.cache_folder);
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", folder.string(), code.message())};
+  const std::string path = (folder / fmt::format("{:016x}.shoal", key)).string();
+  if (std::filesystem::exists(path, code)) return path;
+  console.info(fmt::format("building {} into {}", arguments.scene, path));
+  options.progress = build_progress(console);
+  auto report = build_scene(fs, arguments.scene, path, options);
+  console.end_progress();
+  if (!report.ok()) return std::move(report).error();
+  for (const std::string& warning : report.value().warnings) console.warning(warning);
+  return path;
+}
+
+void choose_sky(const Scene& scene, const std::string& asked, PictureOptions& picture, Console& console) {
+  EnvironmentOptions& sky = picture.shading.environment;
+  const bool dark = scene.emitters.empty() && scene.lights.empty();
+  if (asked.empty() && dark) {
+    sky.kind = EnvironmentOptions::Kind::kConstant;
+    sky.radiance = Vec3(1);
+    console.warning("the scene has no light: lit by a constant sky of 1 (choose one with --environment)");
+  } else if (dark && sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)) {
+    console.warning("the scene has no light and the environment is black: the picture will be black");
+  }
+}
+
+Result<uint64_t> size_or_zero(const std::string& text) {
+  if (text.empty()) return uint64_t{0};
+  return parse_size(text);
+}
+
+}  // namespace
+
+Result<uint64_t> parse_size(const std::string& text) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, code] = std::from_chars(text.data(), end, value);
+  std::string unit(rest, end);
+  if (unit.ends_with("iB")) unit.resize(unit.size() - 2);
+  if (unit.ends_with("B")) unit.resize(unit.size() - 1);
+  int shift = -1;
+  if (unit.empty()) shift = 0;
+  if (unit.size() == 1) {
+    const size_t at = std::string("KMGT").find(static_cast<char>(std::toupper(static_cast<unsigned char>(unit[0]))));
+    if (at != std::string::npos) shift = 10 * (static_cast<int>(at) + 1);
+  }
+  if (code != std::errc() || shift < 0 || !(value > 0) || value > 1e15) {
+    return Error{ErrorCode::kUsage, fmt::format("'{}' is not a size: expected a number with K, M, G or T", text)};
+  }
+  return static_cast<uint64_t>(value * static_cast<double>(1ull << shift));
+}
+
+Result<uint32_t> parse_treelet_size(const std::string& text) {
+  SHOAL_ASSIGN_OR_RETURN(const uint64_t bytes, parse_size(text));
+  if (bytes < kMinTreeletBytes || bytes > kMaxTreeletBytes) {
+    return Error{ErrorCode::kUsage, fmt::format("a treelet size of {} bytes: must be 4K to 4M", bytes)};
+  }
+  return static_cast<uint32_t>(bytes);
+}
+
+Result<EnvironmentOptions> parse_environment(const std::string& text) {
+  EnvironmentOptions environment;
+  if (text.empty()) return environment;
+  if (!text.starts_with("constant:")) {
+    environment.kind = EnvironmentOptions::Kind::kImage;
+    environment.path = text;
+    return environment;
+  }
+  environment.kind = EnvironmentOptions::Kind::kConstant;
+  const char* at = text.data() + 9;
+  const char* end = text.data() + text.size();
+  for (int c = 0; c < 3; ++c) {
+    const auto [rest, code] = std::from_chars(at, end, environment.radiance[c]);
+    const bool separated = c == 2 ? rest == end : rest != end && *rest == ',';
+    if (code != std::errc() || !separated || !(environment.radiance[c] >= 0) || environment.radiance[c] > 1e30f) {
+      return Error{ErrorCode::kUsage,
+                   fmt::format("'{}' is not an environment: expected constant:R,G,B with numbers >= 0, F.hdr or F.exr",
+                               text)};
+    }
+    at = rest + 1;
+  }
+  return environment;
+}
+
+void RenderArguments::declare(CLI::App& app) {
+  app.add_option("scene", scene, "scene: .gltf, .glb (built first where needed) or .shoal")->required();
+  app.add_option("--width", picture.width, "picture width in pixels")->capture_default_str();
+  app.add_option("--height", picture.height, "picture height in pixels")->capture_default_str();
+  app.add_option("--spp", picture.samples, "samples a pixel")->capture_default_str();
+  app.add_option("--bounces", picture.shading.bounces, "scattering events of a path at most")->capture_default_str();
+  app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
+  app.add_option("--camera", picture.camera, "index among the scene's cameras")->capture_default_str();
+  app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
+  app.add_option("--threads", execution.threads, "threads; 0: all")->capture_default_str();
+  app.add_option("--max-memory", max_memory, "cap on the whole process, such as 2G (default: 70 % of what there is)");
+  app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")
+      ->capture_default_str()
+      ->group("For experiments");
+  app.add_option("--queue-capacity", execution.policy_options.queue_capacity, "policy full: rays that fill a queue")
+      ->capture_default_str()
+      ->group("For experiments");
+  app.add_option("--treelet-size", treelet_size, "bytes of a treelet when a glTF is built, 4K to 4M (default 256K)")
+      ->group("For experiments");
+  app.add_option("--page-cache", page_cache, "bytes of decoded pages kept (default: from the plan)")
+      ->group("For experiments");
+  app.add_option("--rays-in-flight", execution.rays_in_flight, "rays that may wait at once (default: from the plan)")
+      ->group("For experiments");
+  app.add_option("--state-levels", more_levels, "levels of traversal state kept in a ray, 0 to 32")
+      ->check(CLI::Range(0, 32))
+      ->group("For experiments");
+  app.add_flag("--buffered-reads", buffered_reads, "read through the operating system's cache")
+      ->group("For experiments");
+  app.add_option("--cache-dir", cache_folder, "where built scenes are kept (default: ~/.cache/shoal)");
+}
+
+Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console& console) {
+  PreparedRender prepared;
+  prepared.picture = arguments.picture;
+  prepared.execution = arguments.execution;
+  SHOAL_ASSIGN_OR_RETURN(prepared.execution.max_memory_bytes, size_or_zero(arguments.max_memory));
+  SHOAL_ASSIGN_OR_RETURN(prepared.execution.page_cache_bytes, size_or_zero(arguments.page_cache));
+  SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, parse_environment(arguments.environment));
+  SceneBuildOptions build;
+  build.threads = arguments.execution.threads;
+  build.max_memory_bytes = prepared.execution.max_memory_bytes;
+  if (!arguments.treelet_size.empty()) {
+    SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
+  }
+  std::string path = arguments.scene;
+  if (!is_shoal_file(path)) {
+    SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, build, console));
+  }
+  const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
+  SHOAL_ASSIGN_OR_RETURN(prepared.scene, open_scene(posix_file_system(), path, mode, {arguments.more_levels}));
+  choose_sky(prepared.scene, arguments.environment, prepared.picture, console);
+  return prepared;
+}
+
+RenderHooks console_hooks(Console& console) {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  RenderHooks hooks;
+  hooks.stop = &g_stop;
+  hooks.progress = [&console](const RenderProgress& p) {
+    const double fraction = static_cast<double>(p.samples_done) / static_cast<double>(p.samples_total);
+    console.show_progress("rendering", fraction, p.seconds,
+                          fmt::format("{:.2f} M samples/s, {} read",
+                                      static_cast<double>(p.samples_done) / p.seconds * 1e-6,
+                                      format_bytes(p.disk_read_bytes)));
+  };
+  return hooks;
+}
+
+std::string describe_plan(const MemoryPlan& plan) {
+  return fmt::format("memory: cap {}; process {}, film {}, {} paths in flight {}, page cache {} of {}, scratch {}",
+                     format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.film_bytes),
+                     plan.paths_in_flight, format_bytes(plan.paths_bytes), format_bytes(plan.cache_bytes),
+                     format_bytes(plan.scene_page_bytes), format_bytes(plan.scratch_bytes));
+}
+
+std::function<void(const BuildProgress&)> build_progress(Console& console) {
+  return [&console, start = std::chrono::steady_clock::now()](const BuildProgress& p) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    console.show_progress(p.stage, p.fraction, seconds, "");
+  };
+}
+
+}  // namespace shoal

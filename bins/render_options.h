@@ -1,0 +1,52 @@
+// The options that `render` and `compare` share, and what they do with them: find or build the .shoal, open it, choose
+// the sky. Called by bins.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "bins/console.h"
+#include "engine/build_scene.h"
+#include "engine/render.h"
+#include "io/result.h"
+
+namespace shoal {
+
+/// "64K", "2G", "1048576": binary units. Fails with: kUsage.
+Result<uint64_t> parse_size(const std::string& text);
+/// A size between 4K and 4M. Fails with: kUsage.
+Result<uint32_t> parse_treelet_size(const std::string& text);
+/// "constant:R,G,B", "F.hdr", "F.exr". Fails with: kUsage.
+Result<EnvironmentOptions> parse_environment(const std::string& text);
+
+/// Options as they stand on the command line.
+struct RenderArguments {
+  std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder;
+  PictureOptions picture;
+  ExecutionOptions execution;
+  bool buffered_reads = false;
+  uint32_t more_levels = 32;
+
+  void declare(CLI::App& app);
+};
+
+/// A scene ready to render, with the options resolved.
+struct PreparedRender {
+  Scene scene;
+  PictureOptions picture;
+  ExecutionOptions execution;
+};
+/// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment.
+Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console& console);
+
+/// Hooks that show progress and stop on SIGINT and SIGTERM.
+RenderHooks console_hooks(Console& console);
+/// The memory plan as one log line.
+std::string describe_plan(const MemoryPlan& plan);
+/// Build progress on the console.
+std::function<void(const BuildProgress&)> build_progress(Console& console);
+
+}  // namespace shoal

@@ -1,0 +1,197 @@
+#include "engine/render_report.h"
+
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "engine/camera.h"
+#include "engine/process_memory.h"
+
+namespace shoal {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Matrix = std::array<float, 16>;
+
+double ratio(uint64_t a, uint64_t b) { return b == 0 ? 0.0 : static_cast<double>(a) / static_cast<double>(b); }
+
+/// Row-vector matrices, as OpenEXR's attributes are: p' = p M.
+Matrix world_to_camera(const Affine3& c) {
+  const Vec3 x = glm::normalize(c.column_x), y = glm::normalize(c.column_y), z = glm::normalize(c.column_z);
+  const Vec3 t = c.translation;
+  return {x.x, y.x, z.x, 0, x.y, y.y, z.y, 0, x.z, y.z, z.z, 0, -glm::dot(t, x), -glm::dot(t, y), -glm::dot(t, z), 1};
+}
+
+Matrix multiply(const Matrix& a, const Matrix& b) {
+  Matrix m{};
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      for (int k = 0; k < 4; ++k) m[i * 4 + j] += a[i * 4 + k] * b[k * 4 + j];
+    }
+  }
+  return m;
+}
+
+/// Camera space to [-1, 1] in x and y; z keeps the distance along the view (perspective divides by -z).
+Matrix camera_to_ndc(const CameraRecord& camera, float aspect) {
+  if (camera.perspective != 0) {
+    const float y = 1.0f / camera.tan_half_yfov;
+    return {y / aspect, 0, 0, 0, 0, y, 0, 0, 0, 0, -1, -1, 0, 0, 0, 0};
+  }
+  const float y = 1.0f / camera.ymag;
+  return {y / aspect, 0, 0, 0, 0, y, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
+}
+
+std::string cpu_name() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown";
+}
+
+Json machine_json() {
+  utsname name{};
+  uname(&name);
+  return {{"cpu", cpu_name()},
+          {"hardware_threads_count", std::thread::hardware_concurrency()},
+          {"memory_limit_bytes", memory_limit_bytes()},
+          {"system", fmt::format("{} {} {}", name.sysname, name.release, name.machine)},
+          {"compiler", __VERSION__}};
+}
+
+Json plan_json(const MemoryPlan& plan) {
+  return {{"cap_bytes", plan.cap_bytes},         {"process_bytes", plan.process_bytes},
+          {"film_bytes", plan.film_bytes},       {"paths_bytes", plan.paths_bytes},
+          {"cache_bytes", plan.cache_bytes},     {"scratch_bytes", plan.scratch_bytes},
+          {"total_bytes", plan.total_bytes()},   {"paths_in_flight_count", plan.paths_in_flight},
+          {"scene_page_bytes", plan.scene_page_bytes}};
+}
+
+Json options_json(const PictureOptions& picture, const ExecutionOptions& execution) {
+  return {{"width", picture.width},
+          {"height", picture.height},
+          {"samples_per_pixel", picture.samples},
+          {"camera", picture.camera},
+          {"bounces", picture.shading.bounces},
+          {"seed", picture.shading.seed},
+          {"order", order_name(execution.order)},
+          {"policy", execution.policy},
+          {"queue_capacity", execution.policy_options.queue_capacity},
+          {"max_memory_bytes", execution.max_memory_bytes},
+          {"page_cache_bytes", execution.page_cache_bytes},
+          {"rays_in_flight", execution.rays_in_flight}};
+}
+
+}  // namespace
+
+std::string_view order_name(Order order) { return order == Order::kQueued ? "queued" : "depth-first"; }
+
+std::string format_bytes(uint64_t bytes) {
+  static constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+  double value = static_cast<double>(bytes);
+  size_t unit = 0;
+  while (value >= 1000 && unit + 1 < std::size(kUnits)) value /= 1024, ++unit;
+  if (unit == 0) return fmt::format("{} B", bytes);
+  return fmt::format("{:.{}f} {}", value, value < 10 ? 2 : value < 100 ? 1 : 0, kUnits[unit]);
+}
+
+ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture) {
+  ExrImage image;
+  image.width = picture.width;
+  image.height = picture.height;
+  const size_t pixels = result.rgba.size() / 4;
+  static constexpr const char* kNames[] = {"R", "G", "B", "A"};
+  for (size_t c = 0; c < 4; ++c) {
+    ExrChannel channel{kNames[c], false, std::vector<float>(pixels)};
+    for (size_t i = 0; i < pixels; ++i) channel.values[i] = result.rgba[i * 4 + c];
+    image.channels.push_back(std::move(channel));
+  }
+  const CameraRecord camera =
+      scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
+  const float aspect = static_cast<float>(picture.width) / static_cast<float>(picture.height);
+  const Matrix to_camera = world_to_camera(camera.camera_to_world);
+  image.text["software"] = "Shoal " SHOAL_VERSION;
+  image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
+  image.numbers["samplesPerPixel"] = static_cast<float>(picture.samples);
+  image.matrices["worldToCamera"] = to_camera;
+  image.matrices["worldToNDC"] = multiply(to_camera, camera_to_ndc(camera, aspect));
+  return image;
+}
+
+std::string stats_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
+                       const ExecutionOptions& execution) {
+  const RayCounters rays = result.counters.total();
+  Json json;
+  json["schema_version"] = 1;
+  json["program"] = "Shoal " SHOAL_VERSION;
+  json["options"] = options_json(picture, execution);
+  json["machine"] = machine_json();
+  json["scene"] = {{"file", scene.file->path()},
+                   {"file_bytes", scene.file->file_bytes()},
+                   {"triangles_count", scene.header.triangles_count},
+                   {"treelets_count", scene.treelets.size()},
+                   {"instances_count", scene.top_tree.instance_count()},
+                   {"geometry_bytes", scene.header.geometry_bytes},
+                   {"resident_table_bytes", scene.resident_bytes()}};
+  json["memory"] = plan_json(result.plan);
+  json["memory"]["peak_cache_bytes"] = result.peak_cache_bytes;
+  json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();
+  json["render_seconds"] = result.seconds;
+  json["threads_count"] = result.threads;
+  json["rays_per_second"] = static_cast<double>(rays.rays_traced_count) / result.seconds;
+  json["counters"] = Json::parse(counters_json(result.counters));
+  Json& units = json["counter_list"] = Json::array();
+  for (const CounterInfo& info : counter_list()) {
+    units.push_back({{"name", info.name}, {"unit", info.unit}, {"meaning", info.sentence}});
+  }
+  return json.dump(1) + "\n";
+}
+
+std::string traffic_table(const std::vector<TrafficColumn>& columns) {
+  std::string text = fmt::format("{:<34}", "");
+  for (const TrafficColumn& column : columns) text += fmt::format("{:>16}", column.title);
+  text += "\n";
+  const auto row = [&](std::string_view name, auto&& value) {
+    text += fmt::format("{:<34}", name);
+    for (const TrafficColumn& column : columns) {
+      text += fmt::format("{:>16}", value(*column.result, column.result->counters, column.result->counters.total()));
+    }
+    text += "\n";
+  };
+  using R = const RenderResult&;
+  using C = const RenderCounters&;
+  using T = const RayCounters&;
+  row("read from disk", [](R, C c, T) { return format_bytes(c.disk_read_bytes); });
+  row("disk reads", [](R, C c, T) { return fmt::format("{}", c.disk_reads_count); });
+  row("treelet loads from disk", [](R, C c, T) { return fmt::format("{}", c.treelet_loads_count); });
+  row("bytes from disk a ray", [](R, C c, T t) {
+    return fmt::format("{:.1f}", ratio(c.disk_read_bytes, t.rays_traced_count));
+  });
+  row("page requests", [](R, C c, T) { return fmt::format("{}", c.page_requests_count); });
+  row("page hits", [](R, C c, T) {
+    return fmt::format("{:.2f} %", 100 * ratio(c.page_hits_count, c.page_requests_count));
+  });
+  row("treelets taken in hand", [](R, C c, T) { return fmt::format("{}", c.treelet_batches_count); });
+  row("treelet bytes taken in hand", [](R, C c, T) { return format_bytes(c.treelet_visit_bytes); });
+  row("ray visits a treelet in hand", [](R, C c, T) {
+    return fmt::format("{:.1f}", ratio(c.treelet_visits_count, c.treelet_batches_count));
+  });
+  row("treelet visits a ray", [](R, C c, T t) {
+    return fmt::format("{:.2f}", ratio(c.treelet_visits_count, t.rays_traced_count));
+  });
+  row("ray bytes through queues", [](R, C c, T) { return format_bytes(c.ray_moved_bytes); });
+  row("path state bytes touched", [](R, C c, T) { return format_bytes(c.path_state_moved_bytes); });
+  row("rays", [](R, C, T t) { return fmt::format("{}", t.rays_traced_count); });
+  row("page cache", [](R r, C, T) { return format_bytes(r.plan.cache_bytes); });
+  row("seconds", [](R r, C, T) { return fmt::format("{:.2f}", r.seconds); });
+  row("million rays a second", [](R r, C, T t) {
+    return fmt::format("{:.3f}", static_cast<double>(t.rays_traced_count) / r.seconds * 1e-6);
+  });
+  return text;
+}
+
+}  // namespace shoal

@@ -1,0 +1,34 @@
+// What a finished render leaves: the picture as EXR (and PNG), the `--stats` JSON, and the traffic table for people.
+// Called by bins. Plain functions.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/render.h"
+#include "io/image.h"
+
+namespace shoal {
+
+std::string_view order_name(Order order);
+
+/// R,G,B,A as float with the attributes of docs/design.md: software, renderTimeSeconds, samplesPerPixel, worldToCamera,
+/// worldToNDC.
+ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture);
+
+/// The `--stats` document (schema version, options, machine, memory plan, counters), JSON text.
+std::string stats_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
+                       const ExecutionOptions& execution);
+
+/// One column of the traffic table.
+struct TrafficColumn {
+  std::string title;
+  const RenderResult* result;
+};
+/// Bytes from disk, loads, rays a load, visits a ray, time: one row a figure, one column a render.
+std::string traffic_table(const std::vector<TrafficColumn>& columns);
+
+/// "12.3 MiB": binary units, three digits.
+std::string format_bytes(uint64_t bytes);
+
+}  // namespace shoal
