@@ -1,0 +1,64 @@
+#include "engine/film.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <thread>
+
+namespace shoal {
+namespace {
+
+TEST(FixedPoint128, HoldsFloatsExactlyOverItsRange) {
+  for (const float value : {0.0f, 1.0f, -1.0f, 0.1f, 3.0e-10f, 1.5e10f, -2.5e-7f, 0x1p-41f, 0x1.fffffep39f}) {
+    EXPECT_EQ(FixedPoint128::from_float(value).to_double(), static_cast<double>(value)) << value;
+  }
+  EXPECT_EQ(FixedPoint128::from_float(1e-40f).to_double(), 0.0);
+}
+
+TEST(Film, GivesTheSameBitsForEveryOrderOfAdding) {
+  std::mt19937 random(7);
+  std::vector<Vec3> samples;
+  for (int i = 0; i < 2000; ++i) {
+    const float scale = std::ldexp(1.0f, static_cast<int>(random() % 60) - 30);
+    samples.push_back(Vec3(scale * static_cast<float>(random() % 1000), scale, 1.0f));
+  }
+  Film forwards(1, 1), backwards(1, 1);
+  for (const Vec3& s : samples) forwards.add(0, s, true);
+  std::reverse(samples.begin(), samples.end());
+  for (const Vec3& s : samples) backwards.add(0, s, true);
+  EXPECT_EQ(forwards.resolve(2000), backwards.resolve(2000));
+}
+
+TEST(Film, KeepsATinyPixelBesideAHugeOneAndSmallTermsBesideLargeOnes) {
+  Film film(2, 1);
+  film.add(0, Vec3(1e-10f), false);
+  film.add(1, Vec3(1e10f), false);
+  for (int i = 0; i < 1000000; ++i) film.add(1, Vec3(1e-3f), false);
+  const std::vector<float> rgba = film.resolve(1);
+  EXPECT_EQ(rgba[0], 1e-10f);
+  EXPECT_EQ(rgba[4], static_cast<float>(1e10 + 1e6 * static_cast<double>(1e-3f)));
+}
+
+TEST(Film, SaysWhenARadianceIsClamped) {
+  Film film(1, 1);
+  EXPECT_TRUE(film.add(0, Vec3(1), true));
+  EXPECT_FALSE(film.add(0, Vec3(1e30f, 0, 0), true));
+  EXPECT_EQ(film.resolve(2)[0], (Film::kMaxRadiance + 1) / 2);
+}
+
+TEST(Film, LosesNothingWhenThreadsShareAPixel) {
+  Film film(1, 1);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&film] {
+      for (int i = 0; i < 10000; ++i) film.add(0, Vec3(0.1f, 1, 2), i % 2 == 0);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  const std::vector<float> rgba = film.resolve(40000);
+  EXPECT_EQ(rgba, (std::vector<float>{0.1f, 1, 2, 0.5f}));
+}
+
+}  // namespace
+}  // namespace shoal
