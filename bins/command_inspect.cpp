@@ -22,7 +22,8 @@ struct InspectArguments {
 int run_info(const InspectArguments& arguments, Console& console) {
   const auto scene = open_scene(posix_file_system(), arguments.file, ReadMode::kBuffered, {});
   if (!scene.ok()) return console.error(scene.error());
-  fmt::print("{}\n", arguments.as_json ? describe_scene_json(scene.value()) : describe_scene_text(scene.value()));
+  fmt::print("{}\n", arguments.as_json ? scene_description_json(scene.value())
+                                     : scene_description_text(scene.value()));
   return 0;
 }
 

@@ -38,4 +38,7 @@ Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode,
 /// PageCheck. Fails with: kCorrupt.
 Status check_page(const Scene& scene, const PageRecord& record, std::span<const std::byte> bytes);
 
+/// Reads the whole file: every checksum, the padding, and check_page on every page. Fails with: kCorrupt, kStorage.
+Status verify_scene(const Scene& scene);
+
 }  // namespace shoal
