@@ -1,6 +1,6 @@
-// Queued: rays wait beside others that want the same treelet; a policy chooses the treelet, a thread takes it in hand,
-// shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new camera
-// samples are admitted as paths end.
+// Queued: rays wait beside others that want the same treelet; a policy chooses the treelet, a thread takes it in
+// hand, shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new
+// camera samples are admitted as paths end.
 #include <thread>
 
 #include "engine/queued_paths.h"
@@ -9,7 +9,8 @@
 namespace shoal {
 namespace {
 
-constexpr uint32_t kAdmitBatch = 1024;
+/// New paths are begun in batches, so that taking free ones and counting samples costs a lock a batch.
+constexpr uint32_t kMaxAdmitBatch = 1024;
 
 class Waiting final : public WaitingView {
  public:
@@ -28,15 +29,22 @@ class Waiting final : public WaitingView {
 class QueuedWorker {
  public:
   QueuedWorker(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy, std::mutex& policy_mutex)
-      : context_(context), paths_(paths), policy_(policy), policy_mutex_(policy_mutex), worker_(context) {}
+      : context_(context),
+        paths_(paths),
+        policy_(policy),
+        policy_mutex_(policy_mutex),
+        worker_(context),
+        admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)) {}
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.samples.count()) {
-      admit();
+      while (room_for(admit_batch_)) admit(admit_batch_);
       const TreeletId treelet = choose();
       if (treelet != kNoIndex) {
         drain(treelet);
-      } else if (!can_admit()) {
+      } else if (room_for(1)) {
+        admit(admit_batch_);
+      } else {
         std::this_thread::yield();  // other threads have the last rays in hand
       }
       worker_.report_progress();
@@ -45,35 +53,32 @@ class QueuedWorker {
   }
 
  private:
-  bool can_admit() const {
-    return paths_.free_count() > 0 && context_.next_sample.load(std::memory_order_relaxed) < context_.samples.count();
+  /// Whether so many new paths could begin now.
+  bool room_for(uint32_t paths) const {
+    return paths_.free_count() >= paths && !context_.ended.load(std::memory_order_relaxed) &&
+           context_.next_sample.load(std::memory_order_relaxed) < context_.samples.count();
   }
 
   TreeletId choose() {
     std::lock_guard guard(policy_mutex_);
-    return policy_.choose(Waiting(context_, paths_), can_admit());
+    return policy_.choose(Waiting(context_, paths_), room_for(admit_batch_));
   }
 
-  /// Begins new paths while there is room for a batch of them.
-  void admit() {
-    const uint32_t batch = std::min(kAdmitBatch, paths_.path_count());
-    while (paths_.free_count() >= batch || (can_admit() && paths_.free_count() == paths_.path_count())) {
-      if (!can_admit() || context_.ended.load(std::memory_order_relaxed)) return;
-      uint32_t path = kNoIndex;
-      const uint32_t taken = paths_.take_free(batch, &path);
-      if (taken == 0) return;
-      const uint64_t first = context_.next_sample.fetch_add(taken);
-      for (uint64_t index = first; index < first + taken; ++index) {
-        const uint32_t current = path;
-        path = paths_.state(current).next_free;
-        if (index < context_.samples.count()) {
-          rays_[0] = worker_.begin_path(index, current, paths_.state(current));
-          ray_count_ = 1;
-          handle_rays();
-        } else {
-          paths_.give_back(current);
-        }
+  /// Begins up to `wanted` new paths: addresses their camera rays and queues them.
+  void admit(uint32_t wanted) {
+    uint32_t path = kNoIndex;
+    const uint32_t taken = paths_.take_free(wanted, &path);
+    const uint64_t first = context_.next_sample.fetch_add(taken);
+    for (uint64_t index = first; index < first + taken; ++index) {
+      const uint32_t current = path;
+      path = paths_.state(current).next_free;
+      if (index >= context_.samples.count()) {
+        paths_.give_back(current);
+        continue;
       }
+      rays_[0] = worker_.begin_path(index, current, paths_.state(current));
+      ray_count_ = 1;
+      handle_rays();
     }
   }
 
@@ -161,7 +166,8 @@ class QueuedWorker {
   DrainPolicy& policy_;
   std::mutex& policy_mutex_;
   RenderWorker worker_;
-  Ray rays_[2];             ///< of the path being handled
+  uint32_t admit_batch_;
+  Ray rays_[2];  ///< of the path being handled
   uint32_t ray_count_ = 0;
   RayBlock block_;
 };
@@ -170,9 +176,8 @@ class QueuedWorker {
 
 void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy) {
   std::mutex policy_mutex;
-  run_on_threads(context.threads, [&](unsigned) {
-    std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run();
-  });
+  run_on_threads(context.threads,
+                 [&](unsigned) { std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run(); });
 }
 
 }  // namespace shoal
