@@ -6,7 +6,8 @@
 //   threads    any number; two threads that miss the same page read it once, the second waits.
 //   order      among unpinned pages the one with the least waiting work goes first (see WaitingWork), ties
 //              by least recent use; with no WaitingWork this is plain LRU.
-//              Exact up to 512 resident pages; above, work that waits may be stale by one page in 16 (eviction_order.h).
+//              Exact up to 512 resident pages; above, waiting work may be stale by one page in 16
+//              (eviction_order.h).
 //   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
 //              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
 //              most kMaxPinsPerThread pages.
@@ -80,8 +81,8 @@ class PageCache {
   PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {});
   ~PageCache();
 
-  /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread, when
-  /// each pins one page of a kind at a time. Tables are not read through the cache.
+  /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread,
+  /// when each pins one page of a kind at a time. Tables are not read through the cache.
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
 
   /// Memory that the cache takes beside its capacity: its slots, and room to rank what is resident.
