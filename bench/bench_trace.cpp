@@ -8,8 +8,7 @@
 
 #include <cstdlib>
 
-#include "tests/support/hand_made_scene.h"
-#include "treelets/build_object.h"
+#include "tests/support/built_scene.h"
 
 namespace shoal::testing {
 namespace {
@@ -30,47 +29,6 @@ double median_seconds(const std::function<void()>& work) {
   }
   std::sort(seconds.begin() + 1, seconds.end());
   return seconds[3];
-}
-
-class PageSink : public TreeletSink {
- public:
-  Result<TreeletId> add(std::span<const std::byte> geometry, std::span<const std::byte>) override {
-    pages.emplace_back(geometry);
-    bytes += geometry.size();
-    return static_cast<TreeletId>(pages.size() - 1);
-  }
-  std::vector<AlignedPage> pages;
-  uint64_t bytes = 0;
-};
-
-/// A product-built scene of one identity instance.
-TestScene build_scene(const std::vector<TestTriangle>& triangles, uint32_t treelet_bytes) {
-  TriangleSoup soup;
-  for (const TestTriangle& t : triangles) {
-    for (const Vec3& p : t.p) soup.positions.insert(soup.positions.end(), {p.x, p.y, p.z});
-    soup.primitive.push_back(t.primitive);
-    soup.material.push_back(0);
-  }
-  PageSink sink;
-  BuiltObject object = build_object(std::move(soup), {treelet_bytes}, nullptr, sink).value();
-  TestScene scene;
-  const InstanceBounds bounds{0, object.bounds};
-  scene.nodes = build_instance_tree({&bounds, 1});
-  const uint32_t base = static_cast<uint32_t>(scene.nodes.size());
-  for (TopNode node : object.nodes) {
-    if (node.parent != kNoIndex) node.parent += base << 3;
-    for (int slot = 0; slot < 8; ++slot) node.child[slot] += node.kind[slot] == ChildKind::kNode ? base : 0;
-    scene.nodes.push_back(node);
-  }
-  scene.entries = object.entries;
-  scene.instances.push_back(make_instance({0, {}}, base, object.bounds));
-  for (uint32_t slot = 0; slot < 8; ++slot) {
-    if (scene.nodes[0].kind[slot] == ChildKind::kInstance) scene.instances[0].tree_child = slot;
-  }
-  scene.pages = std::move(sink.pages);
-  fmt::print("{} triangles, {} treelets, {:.1f} bytes a triangle, {} top nodes\n", triangles.size(), scene.pages.size(),
-             static_cast<double>(sink.bytes) / static_cast<double>(triangles.size()), scene.nodes.size());
-  return scene;
 }
 
 void run_ours(const TestScene& scene, const std::vector<Ray>& rays) {
@@ -140,7 +98,12 @@ void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool e
   const auto soup = random_soup(random, triangle_count, size);
   std::vector<Ray> rays;
   for (size_t i = 0; i < ray_count; ++i) rays.push_back(make_ray(random_vector(random), random_vector(random)));
-  run_ours(build_scene(soup, treelet_bytes), rays);
+  const TestScene scene = build_scene({soup}, {{0, {}}}, treelet_bytes);
+  size_t bytes = 0;
+  for (const AlignedPage& page : scene.pages) bytes += page.bytes().size();
+  fmt::print("{} triangles, {} treelets, {:.1f} bytes a triangle, {} top nodes\n", soup.size(), scene.pages.size(),
+             static_cast<double>(bytes) / static_cast<double>(soup.size()), scene.nodes.size());
+  run_ours(scene, rays);
   if (embree) run_embree(soup, rays);
 }
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
-#include "tests/support/hand_made_scene.h"
+#include "tests/support/built_scene.h"
 #include "treelets/trace_treelet_scalar.h"
 
 namespace shoal::testing {
@@ -88,7 +88,7 @@ TEST(Trace, FindsWhatBruteForceFindsInASoup) {
   const auto soup = random_soup(random, 2000, 0.1f);
   for (const TestSceneOptions options : {TestSceneOptions{5000, 4}, {200, 4}, {20, 8}, {7, 1}, {200, 3, true}}) {
     const TestScene scene = make_scene({soup}, {{0, {}}}, options);
-    EXPECT_GT(compare(scene, awkward_rays(random, soup, 2000)), 700u);
+    EXPECT_GT(compare(scene, awkward_rays(random, soup, 1000)), 350u);
   }
 }
 
@@ -97,7 +97,7 @@ TEST(Trace, FindsWhatBruteForceFindsInAMesh) {
   const auto mesh = closed_mesh(20, 40, 0.2f);
   for (const TestSceneOptions options : {TestSceneOptions{100, 4}, {1000, 8}, {50, 2, true}}) {
     const TestScene scene = make_scene({mesh}, {{0, {}}}, options);
-    EXPECT_GT(compare(scene, awkward_rays(random, mesh, 2000)), 700u);
+    EXPECT_GT(compare(scene, awkward_rays(random, mesh, 1000)), 350u);
   }
 }
 
@@ -119,7 +119,7 @@ TEST(Trace, FindsWhatBruteForceFindsInAxisAlignedGrids) {
   }
   for (const TestSceneOptions options : {TestSceneOptions{100, 4}, {2000, 8}, {50, 2, true}}) {
     const TestScene scene = make_scene({grid}, {{0, {}}}, options);
-    EXPECT_GT(compare(scene, awkward_rays(random, grid, 2000)), 700u);
+    EXPECT_GT(compare(scene, awkward_rays(random, grid, 1000)), 350u);
   }
 }
 
@@ -165,7 +165,7 @@ TEST(Trace, FindsHitsOnTheVeryFacesOfInstances) {
   }
   const TestScene scene = make_scene({square}, placements);
   std::vector<Ray> rays;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 10000; ++i) {
     const Affine3& m = placements[random() % placements.size()].object_to_world;
     const float u = static_cast<float>(random() % 3) * 0.5f, v = static_cast<float>(random() % 3) * 0.5f;
     // Beside a corner or an edge by as much as the transform to object space may err.
@@ -175,6 +175,20 @@ TEST(Trace, FindsHitsOnTheVeryFacesOfInstances) {
     rays.push_back(make_ray(origin, target - origin));
   }
   EXPECT_GT(compare(scene, rays), 1000u);
+}
+
+TEST(Trace, TheSizeOfTreeletsCannotChangeAHit) {
+  std::mt19937 random(9);
+  const auto soup = random_soup(random, 3000, 0.1f);
+  const auto mesh = closed_mesh(12, 24, 0.2f, 3000);
+  Placement turned;
+  turned.object = 1;
+  turned.object_to_world = {{0.3f, 0.4f, 0}, {-0.4f, 0.3f, 0.1f}, {0, 0, -0.5f}, {0.5f, -2, 1}};
+  const auto rays = awkward_rays(random, soup, 500);
+  for (const uint32_t treelet_bytes : {4u << 10, 16u << 10, 256u << 10, 4u << 20}) {
+    EXPECT_GT(compare(build_scene({soup}, {{0, {}}}, treelet_bytes), rays), 150u);
+    EXPECT_GT(compare(build_scene({soup, mesh}, {{0, {}}, turned, {1, {}}}, treelet_bytes), rays), 150u);
+  }
 }
 
 TEST(Trace, ScalesOfCoordinatesDoNotMatter) {
