@@ -178,7 +178,8 @@ class PrimitiveAppender {
     if (tangent_) move_directions(*tangent_, points_, 1);
   }
 
-  void append(const uint32_t* places, uint32_t id) {
+  void append(const uint32_t* corners, uint32_t id) {
+    const uint32_t places[3] = {corners[0], corners[mirrored_ ? 2 : 1], corners[mirrored_ ? 1 : 2]};
     const float* p[3];
     bool usable = true;
     for (int k = 0; k < 3; ++k) {

@@ -32,9 +32,10 @@ struct ReadCounts {
   std::vector<std::string> warnings;
 };
 
-/// Appends one primitive. `bake` moves it (null: object space is kept). A map that mirrors keeps the order of
-/// corners; normals go by the inverse transpose, a tangent's handedness turns with the mirror. Fails with: kInput
-/// (an attribute of the wrong type or too short, an index out of range), kStorage.
+/// Appends one primitive. `bake` moves it (null: object space is kept). A map that mirrors swaps the last two
+/// corners, so that the front stays where corners run counter-clockwise (glTF 2.0, section 3.7.4); normals go by
+/// the inverse transpose, a tangent's handedness turns with the mirror. Fails with: kInput (an attribute of the
+/// wrong type or too short, an index out of range), kStorage.
 Status append_primitive(gltf::BufferFiles& files, const gltf::Document& document, const MaterialPlan& plan,
                         const PrimitiveSource& source, const AffineDouble* bake, TriangleSoup& soup,
                         ReadCounts& counts);

@@ -51,7 +51,7 @@ TEST(BuildScene, ComposesNodeMatricesFromTheRootDown) {
   scene.add_node({{"children", {0}}, {"scale", {-2, 1, 1}}});  // mirrors what its child has moved
   scene.save(fs);
   const BuiltScene built = build_and_open(fs);
-  const float expected[9] = {-4, 0, 0, -6, 0, 0, -4, 1, 0};
+  const float expected[9] = {-4, 0, 0, -4, 1, 0, -6, 0, 0};  // the mirror turns the order, not the front
   for (int i = 0; i < 9; ++i) EXPECT_EQ(built.objects[0][0].position[i], expected[i]);
 }
 
