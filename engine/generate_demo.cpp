@@ -92,8 +92,8 @@ class DemoScene {
   void add_materials() {
     DemoMaterials& m = materials_;
     m.sand = material(rough_material("sand", {0.66f, 0.54f, 0.38f}));
-    m.rock = material(rough_material("rock", {0.36f, 0.31f, 0.31f}, 0.85));
-    m.dark_rock = material(rough_material("weathered rock", {0.22f, 0.25f, 0.26f}, 0.8));
+    m.rock = material(rough_material("rock", {0.50f, 0.42f, 0.38f}, 0.85));
+    m.dark_rock = material(rough_material("weathered rock", {0.34f, 0.37f, 0.36f}, 0.8));
     m.brain[0] = material(rough_material("brain coral, ochre", {0.72f, 0.42f, 0.10f}, 0.6));
     m.brain[1] = material(rough_material("brain coral, violet", {0.42f, 0.16f, 0.45f}, 0.6));
     m.gold = material(metal_material("gold", {1.0f, 0.72f, 0.32f}, 0.16));
@@ -105,10 +105,10 @@ class DemoScene {
     m.pearl = material(rough_material("pearl", {0.90f, 0.84f, 0.80f}, 0.18));
     m.orb = material(emissive_material("orb", {15, 5.2f, 1.6f}));
     m.star = material(rough_material("starfish", {0.86f, 0.20f, 0.06f}, 0.55));
-    gltf::Material sea = emissive_material("open sea", Vec3(1));
+    gltf::Material sea = emissive_material("open sea", Vec3(1.25f));
     sea.emissive_texture = textured("sea.png", true);
     m.sea = material(sea);
-    gltf::Material veil = rough_material("rippled surface", {0.75, 0.85, 0.88});
+    gltf::Material veil = rough_material("rippled surface", Vec3(1));
     veil.alpha_mode = gltf::AlphaMode::kBlend;
     veil.base_color_texture = textured("caustics.png", true);
     m.veil = material(veil);

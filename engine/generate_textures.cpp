@@ -115,22 +115,22 @@ Vec4 paint_sea(float u, float v) {
   // v = 0.89 is the horizon of sea_dome, which goes to 101 degrees from the zenith.
   const float x = (u - 0.49f) / 0.11f, y = (v - 0.86f) / 0.16f;
   const float glow = 1 / (1 + 1.6f * (x * x + y * y));
-  const Vec3 deep(0.05f, 0.19f, 0.29f), shallow(0.40f, 0.66f, 0.74f), light(0.72f, 0.95f, 0.93f);
+  const Vec3 deep(0.04f, 0.22f, 0.36f), shallow(0.55f, 0.80f, 0.88f), light(0.86f, 1.0f, 0.97f);
   Vec3 color = glm::mix(shallow, deep, static_cast<float>(smooth_step(0.05, 0.95, v)));
-  color = glm::mix(color, light, 0.9f * static_cast<float>(smooth_step(0.12, 0.95, glow)));
+  color = glm::mix(color, light, 0.95f * glow * std::sqrt(glow));
   return Vec4(color, 1);
 }
 
 Vec4 paint_caustics(float u, float v, uint32_t seed) {
   // Caustics are where a warped sheet folds: thin lines around cells, two scales of them.
-  const double x = u * 24, y = v * 24;
+  const double x = u * 44, y = v * 44;
   const double wx = 0.55 * gradient_noise(x * 0.7, y * 0.7, 4, seed),
                wy = 0.55 * gradient_noise(x * 0.7, y * 0.7, 8, seed);
   const double a = std::abs(gradient_noise(x + wx, y + wy, 0, seed + 1));
   const double b = std::abs(gradient_noise(1.9 * x - wy, 1.9 * y + wx, 2, seed + 2));
   const double lines = std::max(1 - smooth_step(0.0, 0.17, a), 0.75 * (1 - smooth_step(0.0, 0.15, b)));
-  const double passed = 0.12 + 0.88 * smooth_step(0.12, 0.5, lines);
-  return Vec4(0, 0, 0, 1 - passed);
+  const double passed = 0.34 + 0.66 * smooth_step(0.10, 0.75, lines);
+  return Vec4(0.86f, 0.94f, 0.95f, 1 - passed);
 }
 
 }  // namespace shoal

@@ -29,7 +29,7 @@ Vec4 paint_sea_fan(float u, float v, uint32_t seed);
 Vec4 paint_marble(float u, float v, uint32_t seed);
 /// Light seen through open water, over sea_dome: brightest ahead.
 Vec4 paint_sea(float u, float v);
-/// Black; alpha is what a rippled surface keeps of the sunlight, with bright lines where it gathers it.
+/// Pale; alpha is what a rippled surface keeps of the sunlight, with bright lines where it gathers it.
 Vec4 paint_caustics(float u, float v, uint32_t seed);
 
 }  // namespace shoal
