@@ -25,11 +25,11 @@ namespace {
 constexpr size_t kChunkTriangles = 1u << 14;
 constexpr uint64_t kMaxObjectTriangles = (1ull << 31) - 1;
 
-// Two corners with equal bits (zeros compared without sign), or a coordinate that is not finite.
+// Two corners with equal bits (zeros compared without sign), or a coordinate out of range or not a number.
 bool degenerate(const float* p) {
   uint32_t bits[9];
   for (int i = 0; i < 9; ++i) {
-    if (!std::isfinite(p[i])) return true;
+    if (!(std::fabs(p[i]) <= kMaxCoordinate)) return true;
     bits[i] = std::bit_cast<uint32_t>(p[i] + 0.0f);  // -0 + 0 = +0
   }
   const auto equal = [&bits](int a, int b) { return std::equal(bits + 3 * a, bits + 3 * a + 3, bits + 3 * b); };

@@ -2,7 +2,8 @@
 // SAH-based Bounding Volume Hierarchies") to a binary tree, collapsed to 8 children, cut into leaf treelets of at
 // most `treelet_bytes`, each packed into a page; small neighbours share a treelet.
 // Called by engine/build_scene for each object. Parallel inside (oneTBB); the result depends on the input
-// and the options only, not on the number of threads. Cost: O(n log n), about 150 bytes a triangle of scratch.
+// and the options only, not on the number of threads. Cost: O(n log n), about 0.7 us of one core and 60 bytes of
+// scratch a triangle beside the soup.
 #pragma once
 
 #include <cstdint>
@@ -23,13 +24,16 @@ struct BuildOptions {
 inline constexpr uint32_t kMinTreeletBytes = 4u << 10;
 inline constexpr uint32_t kMaxTreeletBytes = 4u << 20;
 
+/// Corners farther out (or not finite) are skipped: up to here no box, grid plane or edge overflows a float.
+inline constexpr float kMaxCoordinate = 0x1p125f;
+
 /// The tree of one object over its treelets; node and entry indices are local to the object.
 struct BuiltObject {
   std::vector<TopNode> nodes;        ///< nodes[0] is the root
   std::vector<TreeletEntry> entries;
   Bounds3 bounds;
   uint64_t triangles_count = 0;      ///< stored
-  uint64_t degenerate_count = 0;     ///< skipped: two corners with equal bits, or non-finite corners
+  uint64_t degenerate_count = 0;     ///< skipped: two corners with equal bits, or a corner beyond kMaxCoordinate
   uint64_t leaves_count = 0;
   /// SIMD tests expected of a line that meets the root's box: the sum over wide nodes (resident and in treelets)
   /// and over leaves of the area of their exact box over the root's, one test each. 0 when the root has no area.

@@ -14,7 +14,9 @@ constexpr double kMaxTexelCoordinate = 0x1p22;
 // once, move the result by less than 4 units of 2^-24 relative to it; 2^-20 leaves room for another order of sums.
 constexpr double kInterpolationSlack = 0x1p-20;
 
-double finite_or(float value, double fallback) { return std::isfinite(value) ? value : fallback; }
+bool all_finite(const float* values, int count) {
+  return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
+}
 
 // One axis of a triangle's texel footprint at some level.
 struct Footprint {
@@ -93,11 +95,14 @@ std::optional<CoveragePlan> CoverageCropper::plan(uint32_t triangle) const {
   record.cutoff = material.cutoff;
   double u[3] = {}, v[3] = {};
   for (uint32_t c = 0; c < 3; ++c, corner += layout.floats()) {
-    record.vertex_alpha[c] =
-        layout.color ? static_cast<float>(finite_or(corner[layout.color_offset() + 3], 1)) : 1.0f;
-    if (material.uv_set >= layout.uv_count) continue;  // uv zero, as in find_attributes
-    u[c] = finite_or(corner[layout.uv_offset(material.uv_set)], 0);
-    v[c] = finite_or(corner[layout.uv_offset(material.uv_set) + 1], 0);
+    // What is missing or not finite has the default that treelets/pack_attributes gives it.
+    record.vertex_alpha[c] = 1;
+    if (layout.color && all_finite(corner + layout.color_offset(), 4)) {
+      record.vertex_alpha[c] = corner[layout.color_offset() + 3];
+    }
+    if (material.uv_set >= layout.uv_count) continue;
+    const float* uv = corner + layout.uv_offset(material.uv_set);
+    if (all_finite(uv, 2)) u[c] = uv[0], v[c] = uv[1];
   }
   if (material.texture == kNoIndex) return always_there(record) ? std::nullopt : std::optional(plan);
 
@@ -111,7 +116,7 @@ std::optional<CoveragePlan> CoverageCropper::plan(uint32_t triangle) const {
     const Footprint x = measure(u, width, material.wrap_u), y = measure(v, height, material.wrap_v);
     const bool crop_fits = x.size <= kMaxCropTexels && y.size <= kMaxCropTexels;
     const bool level_fits = width <= kMaxCropTexels && height <= kMaxCropTexels;
-    if (!crop_fits && !level_fits && level + 1 < level_count) continue;
+    if (!crop_fits && !level_fits) continue;
     // Both hold the same texels: take the smaller one.
     const bool whole = !crop_fits || (level_fits && uint64_t{width} * height < x.size * y.size);
     for (int c = 0; c < 3; ++c) record.uv[2 * c] = x.uv[c], record.uv[2 * c + 1] = y.uv[c];
@@ -121,7 +126,7 @@ std::optional<CoveragePlan> CoverageCropper::plan(uint32_t triangle) const {
     record.crop_height = whole ? height : static_cast<uint32_t>(y.size);
     plan.crop = {material.texture,   level,           record.crop_x,  record.crop_y, record.crop_width,
                  record.crop_height, material.wrap_u, material.wrap_v};
-    break;
+    break;  // pyramids end at one texel: some level fits
   }
   return plan;
 }

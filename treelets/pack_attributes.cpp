@@ -1,6 +1,8 @@
 #include "treelets/pack_attributes.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #include "treelets/attribute_layout.h"
@@ -43,12 +45,20 @@ CornerLayout needed_layout(std::span<const uint32_t> triangles, const TriangleSo
   return need;
 }
 
-// Copies the needed floats of one corner.
+// Copies one attribute; one that is not finite becomes its default.
+void take_finite(const float* from, uint32_t count, float missing, float* out) {
+  const bool finite = std::all_of(from, from + count, [](float v) { return std::isfinite(v); });
+  for (uint32_t i = 0; i < count; ++i) out[i] = finite ? from[i] : missing;
+}
+
+// Copies the needed attributes of one corner.
 void take(const float* corner, const CornerLayout& have, const CornerLayout& need, float* out) {
-  if (need.normal) std::memcpy(out + need.normal_offset(), corner + have.normal_offset(), 3 * sizeof(float));
-  if (need.tangent) std::memcpy(out + need.tangent_offset(), corner + have.tangent_offset(), 4 * sizeof(float));
-  if (need.color) std::memcpy(out + need.color_offset(), corner + have.color_offset(), 4 * sizeof(float));
-  std::memcpy(out + need.uv_offset(0), corner + have.uv_offset(0), 2 * sizeof(float) * need.uv_count);
+  if (need.normal) take_finite(corner + have.normal_offset(), 3, 0, out + need.normal_offset());
+  if (need.tangent) take_finite(corner + have.tangent_offset(), 4, 0, out + need.tangent_offset());
+  if (need.color) take_finite(corner + have.color_offset(), 4, 1, out + need.color_offset());
+  for (uint32_t set = 0; set < need.uv_count; ++set) {
+    take_finite(corner + have.uv_offset(set), 2, 0, out + need.uv_offset(set));
+  }
 }
 
 // Corners by their bits: open addressing, a place holds an index plus one.

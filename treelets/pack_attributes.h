@@ -1,5 +1,5 @@
 // The attribute page of one treelet (treelets/attribute_layout.h). Corners with equal bits are stored once; an
-// array that holds nothing but defaults in this treelet is left out. Called by treelets/build_object. Pure. Cost:
+// array that holds nothing but defaults in this treelet is left out; what is not finite becomes its default. Called by treelets/build_object. Pure. Cost:
 // about 0.1 us a triangle.
 #pragma once
 

@@ -18,7 +18,8 @@ inline constexpr int kMaxGridExponent = 127;
 inline float grid_plane(float origin, uint32_t q, float step) { return origin + static_cast<float>(q) * step; }
 
 /// Sets origin, exponent, child_count, lo and hi of `node`; empty slots as the layout says. `boxes` has 1..8 boxes.
-/// A child that reaches more than the largest float beyond the origin is enclosed by an infinite plane.
+/// Coordinates up to kMaxCoordinate (treelets/build_object.h) give finite planes only; beyond, a child may be enclosed
+/// by an infinite one.
 void quantize_boxes(std::span<const Bounds3> boxes, QuantizedNode& node);
 
 }  // namespace shoal

@@ -49,8 +49,7 @@ inline constexpr uint32_t leaf_offset(NodeRef ref) { return ref & ~kLeafBit; }
 
 /// Child boxes on a grid of their own: plane = origin[axis] + q * 2^exponent[axis], evaluated in float by one exact
 /// multiplication and one rounded addition. The packer makes sure that the evaluated planes enclose the child.
-/// It keeps exponents in -126..127 (2^exponent is a normal number); the step times 255 is infinite only where a
-/// node is as wide as the largest float.
+/// It keeps exponents in -126..127 (2^exponent is a normal number) and every plane finite.
 /// An empty slot has child = kEmptyRef and lo > hi on every axis (lo = 255, hi = 0).
 struct QuantizedNode {        // 96 bytes
   float origin[3];            //  0

