@@ -1,0 +1,171 @@
+// The promise that the order is invisible: queued = depth-first to the bit, over treelet sizes, rays in flight, page
+// caches, threads, policies and traversal states, on generated scenes and on real ones.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "engine/build_scene.h"
+#include "engine/generate.h"
+#include "engine/render.h"
+#include "io/page_cache.h"
+
+namespace shoal {
+namespace {
+
+struct Variation {
+  const char* name;
+  uint32_t treelet_bytes = 256u << 10;
+  Order order = Order::kQueued;
+  unsigned threads = 2;
+  uint64_t rays_in_flight = 0;
+  bool smallest_cache = false;
+  uint32_t more_levels = 32;
+  const char* policy = "resident-first";
+  uint32_t queue_capacity = 4096;
+};
+
+const Variation kVariations[] = {
+    {.name = "queued"},
+    {.name = "depth-first, two threads", .order = Order::kDepthFirst},
+    {.name = "one block of rays", .threads = 1, .rays_in_flight = 64},
+    {.name = "one block of rays, five threads, full", .threads = 5, .rays_in_flight = 64, .policy = "full"},
+    {.name = "smallest cache", .smallest_cache = true},
+    {.name = "smallest cache, depth-first", .order = Order::kDepthFirst, .threads = 3, .smallest_cache = true},
+    {.name = "no traversal state", .more_levels = 0},
+    {.name = "one level of state, depth-first", .order = Order::kDepthFirst, .more_levels = 1},
+    {.name = "fullest", .threads = 3, .rays_in_flight = 5000, .policy = "fullest"},
+    {.name = "sweep", .rays_in_flight = 5000, .policy = "sweep"},
+    {.name = "full, small queues", .rays_in_flight = 20000, .policy = "full", .queue_capacity = 100},
+    {.name = "treelets of 4 KiB", .treelet_bytes = 4u << 10, .rays_in_flight = 20000},
+    {.name = "treelets of 4 KiB, smallest everything", .treelet_bytes = 4u << 10, .threads = 1, .rays_in_flight = 64,
+     .smallest_cache = true, .more_levels = 0},
+    {.name = "treelets of 4 MiB", .treelet_bytes = 4u << 20},
+    {.name = "treelets of 64 KiB, depth-first", .treelet_bytes = 64u << 10, .order = Order::kDepthFirst},
+};
+
+class RenderOrders : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("shoal-orders-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override {
+    std::error_code code;
+    std::filesystem::remove_all(folder_, code);
+  }
+
+  std::string generated(const std::string& kind, uint64_t triangles) {
+    GenerateOptions options;
+    options.kind = kind;
+    options.triangles = triangles;
+    options.out_dir = (folder_ / kind).string();
+    const auto report = generate_scene(posix_file_system(), options);
+    EXPECT_TRUE(report.ok()) << report.error().message;
+    return report.value().gltf_path;
+  }
+
+  std::vector<float> render_variation(const std::string& gltf, const PictureOptions& picture, const Variation& v) {
+    FileSystem& fs = posix_file_system();
+    const std::string shoal = (folder_ / ("scene-" + std::to_string(v.treelet_bytes) + ".shoal")).string();
+    if (!std::filesystem::exists(shoal)) {
+      SceneBuildOptions build;
+      build.treelet_bytes = v.treelet_bytes;
+      const auto built = build_scene(fs, gltf, shoal, build);
+      EXPECT_TRUE(built.ok()) << built.error().message;
+    }
+    const auto scene = open_scene(fs, shoal, ReadMode::kBuffered, {v.more_levels});
+    EXPECT_TRUE(scene.ok()) << scene.error().message;
+    ExecutionOptions execution;
+    execution.order = v.order;
+    execution.threads = v.threads;
+    execution.rays_in_flight = v.rays_in_flight;
+    execution.policy = v.policy;
+    execution.policy_options.queue_capacity = v.queue_capacity;
+    if (v.smallest_cache) {
+      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
+    }
+    const auto result = render(fs, scene.value(), picture, execution);
+    EXPECT_TRUE(result.ok()) << v.name << ": " << result.error().message;
+    return result.ok() ? result.value().rgba : std::vector<float>{};
+  }
+
+  /// Every variation gives the bits of depth-first on one thread.
+  void expect_one_picture(const std::string& gltf, const PictureOptions& picture) {
+    const Variation plain{.name = "depth-first, one thread", .order = Order::kDepthFirst, .threads = 1};
+    const std::vector<float> expected = render_variation(gltf, picture, plain);
+    double sum = 0;
+    for (const float value : expected) sum += value;
+    EXPECT_GT(sum, 0) << "a black picture proves nothing";
+    for (const Variation& variation : kVariations) {
+      const std::vector<float> actual = render_variation(gltf, picture, variation);
+      ASSERT_EQ(actual.size(), expected.size()) << variation.name;
+      EXPECT_EQ(std::memcmp(actual.data(), expected.data(), expected.size() * sizeof(float)), 0)
+          << variation.name << " gives another picture";
+    }
+  }
+
+  static PictureOptions small_picture(float sky) {
+    PictureOptions picture;
+    picture.width = 48, picture.height = 40, picture.samples = 3;
+    picture.shading.bounces = 6;
+    picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(sky), {}};
+    return picture;
+  }
+
+  /// Skips the test without real scenes.
+  std::string real(const std::string& path) {
+    const char* data = std::getenv("SHOAL_DATA");
+    return data == nullptr ? std::string() : std::string(data) + "/scenes/" + path;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(RenderOrders, AgreeOnTerrain) { expect_one_picture(generated("terrain", 60000), small_picture(0)); }
+
+TEST_F(RenderOrders, AgreeOnInstancesWithCoverage) {
+  expect_one_picture(generated("instances", 300000), small_picture(0.5f));
+}
+
+TEST_F(RenderOrders, AgreeOnTheDemo) { expect_one_picture(generated("demo", 100000), small_picture(0)); }
+
+#define SHOAL_REAL_SCENE_TEST(name, path, sky)                                              \
+  TEST_F(RenderOrders, AgreeOn##name) {                                                     \
+    if (real(path).empty()) GTEST_SKIP() << "SHOAL_DATA is not set: no real scenes";        \
+    expect_one_picture(real(path), small_picture(sky));                                     \
+  }
+SHOAL_REAL_SCENE_TEST(Coffee, "coffee/coffee.gltf", 0)
+SHOAL_REAL_SCENE_TEST(Lamp, "lamp/lamp.gltf", 0)
+SHOAL_REAL_SCENE_TEST(Helmet, "helmet/helmet.gltf", 1)
+SHOAL_REAL_SCENE_TEST(Kitchen, "kitchen/kitchen.gltf", 0)
+
+TEST_F(RenderOrders, CountEveryRayOfAScene) {
+  // A render whose counters do not balance fails, so what is left to show is that they count this scene's rays.
+  const std::string gltf = generated("terrain", 20000);
+  const std::string shoal = (folder_ / "count.shoal").string();
+  ASSERT_TRUE(build_scene(posix_file_system(), gltf, shoal, {}).ok());
+  const auto scene = open_scene(posix_file_system(), shoal, ReadMode::kBuffered, {});
+  ASSERT_TRUE(scene.ok());
+  const PictureOptions picture = small_picture(0);
+  RayCounters totals[2];
+  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+    ExecutionOptions execution;
+    execution.order = order;
+    execution.threads = 2;
+    const auto result = render(posix_file_system(), scene.value(), picture, execution);
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    totals[order == Order::kQueued ? 0 : 1] = result.value().counters.total();
+    EXPECT_EQ(result.value().counters.of_kind(RayKind::kCamera).rays_traced_count, 48u * 40 * 3);
+    EXPECT_GT(result.value().counters.of_kind(RayKind::kShadow).rays_traced_count, 0u);
+  }
+  EXPECT_EQ(totals[0].rays_traced_count, totals[1].rays_traced_count);
+  EXPECT_EQ(totals[0].ray_hits_count, totals[1].ray_hits_count);
+  EXPECT_GT(totals[0].rays_queued_count, totals[0].rays_traced_count / 2);
+  EXPECT_EQ(totals[1].rays_queued_count, 0u);
+}
+
+}  // namespace
+}  // namespace shoal
