@@ -59,6 +59,14 @@ class ReferencePicture : public ::testing::Test {
   }
 
   Agreement render_and_compare(const std::string& folder, const std::string& name, float sky, uint32_t samples) {
+    const std::vector<float> rgba = render_scene(folder, name, sky, samples, 32);
+    const auto reference = read_exr(posix_file_system(), data_ + "/reference/" + name + ".exr", 1u << 20);
+    EXPECT_TRUE(reference.ok()) << reference.error().message;
+    return compare(ours(rgba), theirs(reference.value()));
+  }
+
+  std::vector<float> render_scene(const std::string& folder, const std::string& name, float sky, uint32_t samples,
+                                  uint32_t bounces) {
     FileSystem& fs = posix_file_system();
     const std::string shoal = (folder_ / (name + ".shoal")).string();
     const auto built = build_scene(fs, data_ + "/scenes/" + folder + "/" + name + ".gltf", shoal, {});
@@ -68,13 +76,11 @@ class ReferencePicture : public ::testing::Test {
     PictureOptions picture;
     picture.width = picture.height = kSide;
     picture.samples = samples;
-    picture.shading.bounces = 32;
+    picture.shading.bounces = bounces;
     picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(sky), {}};
     const auto result = render(fs, scene.value(), picture, {});
     EXPECT_TRUE(result.ok()) << result.error().message;
-    const auto reference = read_exr(fs, data_ + "/reference/" + name + ".exr", 1u << 20);
-    EXPECT_TRUE(reference.ok()) << reference.error().message;
-    return compare(ours(result.value().rgba), theirs(reference.value()));
+    return result.value().rgba;
   }
 
  private:
@@ -116,8 +122,21 @@ void expect_agreement(const Agreement& agreement, double mean_tolerance, double 
 TEST_F(ReferencePicture, CoffeeLambertAgrees) {
   expect_agreement(render_and_compare("coffee", "coffee-lambert", 0, SHOAL_REFERENCE_SAMPLES), 0.01, 0.04);
 }
-TEST_F(ReferencePicture, LampLambertAgrees) {
-  expect_agreement(render_and_compare("lamp", "lamp-lambert", 0, SHOAL_REFERENCE_SAMPLES), 0.01, 0.04);
+// The reference of this scene is 1.1 % too dark, and up to 12 % where its large ceiling panels are seen at grazing angles:
+// docs/decisions/0010-lamp-reference.md shows it by the exact irradiance of the panels, and by the same path tracer
+// agreeing with ours within 0.02 % once the panels are cut into small triangles. Hence the wider tolerances here, and
+// the exact test below.
+TEST_F(ReferencePicture, LampLambertAgreesButForTheReferencesBias) {
+  expect_agreement(render_and_compare("lamp", "lamp-lambert", 0, SHOAL_REFERENCE_SAMPLES), 0.015, 0.08);
+}
+TEST_F(ReferencePicture, LampLambertMeetsTheExactIrradianceOfItsPanels) {
+  const std::vector<float> rgba = render_scene("lamp", "lamp-lambert", 0, 64, 1);
+  double sum = 0;
+  for (uint32_t y = 16; y <= 24; ++y) {
+    for (uint32_t x = 16; x <= 24; ++x) sum += rgba[(y * kSide + x) * 4];
+  }
+  // Lambert's polygon formula for the panels at the wall point of pixel (20, 20): albedo 1, radiance 2.
+  EXPECT_NEAR(sum / 81, 0.00098969, 0.00001);
 }
 TEST_F(ReferencePicture, KitchenLambertAgrees) {
   expect_agreement(render_and_compare("kitchen", "kitchen-lambert", 0, SHOAL_REFERENCE_SAMPLES), 0.01, 0.04);
