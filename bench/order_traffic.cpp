@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include <CLI/CLI.hpp>
 
@@ -18,6 +19,7 @@
 #include "engine/generate.h"
 #include "engine/render.h"
 #include "engine/render_report.h"
+#include "io/page_cache.h"
 
 namespace {
 
