@@ -60,9 +60,9 @@ class Bsdf {
 
   Frame frame_;
   Vec3 geometric_normal_;
-  Vec3 wo_;                ///< local
-  Vec3 diffuse_{0};        ///< weighted albedo; the lobe is diffuse_ / pi
-  Vec3 f0_{0}, f90_{0};    ///< both specular lobes together, with their compensation
+  Vec3 wo_;              ///< local
+  Vec3 diffuse_{0};      ///< weighted albedo; the lobe is diffuse_ / pi
+  Vec3 f0_{0}, f90_{0};  ///< both specular lobes together, with their compensation
   Ggx ggx_{1};
   float lambda_o_ = 0;
   float diffuse_probability_ = 0, specular_probability_ = 0;

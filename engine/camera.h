@@ -1,8 +1,8 @@
 // Camera rays: a pixel sample becomes an origin and a direction. Pure functions of their arguments.
 #pragma once
 
-#include "engine/scene.h"
 #include "engine/sampler.h"
+#include "engine/scene.h"
 
 namespace shoal {
 

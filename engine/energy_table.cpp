@@ -18,7 +18,8 @@ float alpha_at(int row) {
   return std::clamp((y * y) * (y * y), kMinAlpha, 1.0f);
 }
 float mu_at(int column) {
-  const float x = (static_cast<float>(column) + 0.25f) / (kMuCount - 0.75f);  // mu = 0 itself has no limit to tabulate
+  const float x =
+      (static_cast<float>(column) + 0.25f) / (kMuCount - 0.75f);  // mu = 0 itself has no limit to tabulate
   return (x * x) * (x * x);
 }
 
@@ -35,8 +36,8 @@ AxisPoint axis_point(float x, int count) {
 }  // namespace
 
 SpecularAlbedo integrate_specular_albedo(float mu, float alpha, int steps) {
-  // With visible-normal sampling the estimator of the albedo is G2 / G1 = (1 + Lo) / (1 + Lo + Li) above the horizon
-  // and 0 below (Heitz 2018 eq. 19). It is symmetric in phi: half the circle is enough.
+  // With visible-normal sampling the estimator of the albedo is G2 / G1 = (1 + Lo) / (1 + Lo + Li) above the
+  // horizon and 0 below (Heitz 2018 eq. 19). It is symmetric in phi: half the circle is enough.
   const Ggx ggx{alpha};
   const Vec3 wo(std::sqrt(std::max(0.0f, (1 - mu) * (1 + mu))), 0, mu);
   const float one_plus_lambda_o = 1 + ggx.lambda(wo);

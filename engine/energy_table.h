@@ -1,6 +1,7 @@
-// Directional albedo of the GGX lobe, split for Schlick's Fresnel term: with F = F0 + (F90 - F0)(1 - h.wo)^5 the lobe
-// reflects F0 * a + F90 * b. Tabulated by deterministic quadrature over visible normals when a scene has a material
-// with a specular lobe. Called by engine/bsdf. Immutable; a look-up is four square roots and a bilinear interpolation.
+// Directional albedo of the GGX lobe, split for Schlick's Fresnel term: with F = F0 + (F90 - F0)(1 - h.wo)^5 the
+// lobe reflects F0 * a + F90 * b. Tabulated by deterministic quadrature over visible normals when a scene has a
+// material with a specular lobe. Called by engine/bsdf. Immutable; a look-up is four square roots and a bilinear
+// interpolation.
 #pragma once
 
 #include <cstdint>

@@ -27,9 +27,12 @@ double scene_radius(const Scene& scene) {
 double punctual_power(const PunctualLight& light, double radius) {
   const double intensity = luminance(vector3(light.intensity));
   switch (light.type) {
-    case PunctualType::kDirectional: return kPi * radius * radius * intensity;
-    case PunctualType::kPoint: return 4 * kPi * intensity;
-    case PunctualType::kSpot: return 2 * kPi * (1 - static_cast<double>(light.cos_outer)) * intensity;
+    case PunctualType::kDirectional:
+      return kPi * radius * radius * intensity;
+    case PunctualType::kPoint:
+      return 4 * kPi * intensity;
+    case PunctualType::kSpot:
+      return 2 * kPi * (1 - static_cast<double>(light.cos_outer)) * intensity;
   }
   return 0;
 }

@@ -1,8 +1,8 @@
 // One light sample a vertex: which light, which point or direction on it, and with what density.
 //
-// Lights are: all emissive triangles together, each punctual light, and an environment picture. One is chosen with fixed
-// probabilities, half by power and half evenly, so that neither a dim light nearby nor a bright one far away is
-// starved. Powers: emitters 2 pi * sum(area * luminance), point 4 pi I, spot 2 pi (1 - cos outer) I, directional
+// Lights are: all emissive triangles together, each punctual light, and an environment picture. One is chosen with
+// fixed probabilities, half by power and half evenly, so that neither a dim light nearby nor a bright one far away
+// is starved. Powers: emitters 2 pi * sum(area * luminance), point 4 pi I, spot 2 pi (1 - cos outer) I, directional
 // pi R^2 E, environment 4 pi^2 R^2 * mean luminance (R: half the diagonal of the scene).
 // Among emissive triangles the probability is proportional to area * Material::emission_weight, and the
 // point is uniform: the density by area is emission_weight / total, known from a material alone (emitter_pdf).
@@ -25,16 +25,16 @@ struct LightRandom {
 };
 
 struct LightSample {
-  Vec3 direction{0};            ///< unit, from the vertex to the light
-  Vec3 radiance{0};             ///< arriving; of an emitter 1, to be multiplied by its emission. Delta: irradiance
-  double pdf = 0;               ///< solid angle, times the chance of the light; 0: no sample. Delta: the chance alone
-  bool delta = false;           ///< punctual: BSDF sampling never finds it
+  Vec3 direction{0};   ///< unit, from the vertex to the light
+  Vec3 radiance{0};    ///< arriving; of an emitter 1, to be multiplied by its emission. Delta: irradiance
+  double pdf = 0;      ///< solid angle, times the chance of the light; 0: no sample. Delta: the chance alone
+  bool delta = false;  ///< punctual: BSDF sampling never finds it
   const Emitter* emitter = nullptr;
-  Vec2 emitter_uv{0};           ///< of the emissive texture
+  Vec2 emitter_uv{0};  ///< of the emissive texture
   bool at_infinity = false;
-  BoundedPoint target;          ///< where the shadow ray ends, unless at_infinity
+  BoundedPoint target;                 ///< where the shadow ray ends, unless at_infinity
   const Instance* instance = nullptr;  ///< that the emitter belongs to
-  Vec3 target_normal{0};        ///< unit, towards the vertex; zero: a point without a surface
+  Vec3 target_normal{0};               ///< unit, towards the vertex; zero: a point without a surface
 };
 
 class LightSampler {
@@ -60,7 +60,7 @@ class LightSampler {
 
   const Scene* scene_;
   const Environment* environment_;
-  Distribution1D lights_;    ///< punctual lights, then the emitters as one, then the environment
+  Distribution1D lights_;  ///< punctual lights, then the emitters as one, then the environment
   Distribution1D emitters_;
   double emitter_density_ = 0;  ///< chance of the emitters / sum of area * weight
 };

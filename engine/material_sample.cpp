@@ -32,9 +32,8 @@ Result<MaterialSample> sample_material(const Material& material, const Surface& 
   sample.specular = glm::clamp(material.specular * specular.w, 0.0f, 1.0f);
   SHOAL_ASSIGN_OR_RETURN(const Vec4 color, lookup(material.specular_color_texture));
   // Above 1 is allowed here (KHR_materials_specular); the product with dielectric_f0 is clamped by the BSDF.
-  sample.specular_color =
-      glm::max(Vec3(material.specular_color[0], material.specular_color[1], material.specular_color[2]) * Vec3(color),
-               0.0f);
+  sample.specular_color = glm::max(
+      Vec3(material.specular_color[0], material.specular_color[1], material.specular_color[2]) * Vec3(color), 0.0f);
   sample.dielectric_f0 = material.dielectric_f0;
   return sample;
 }

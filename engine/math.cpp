@@ -13,7 +13,8 @@ constexpr double kHalfPi = 1.57079632679489661923;
 /// Taylor polynomials for |r| <= pi/4: the first term left out is below 7e-12 (sin) and 1.2e-10 (cos).
 double sin_reduced(double r) {
   const double z = r * r;
-  return r * (1 + z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800))))));
+  return r *
+         (1 + z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800))))));
 }
 double cos_reduced(double r) {
   const double z = r * r;
@@ -46,7 +47,8 @@ double arc_tangent_double(double y, double x) {
   return y < 0 ? -angle : angle;
 }
 
-/// log2 of a positive normal number: exponent plus 2 atanh(s) / ln 2, s = (m - 1) / (m + 1), m in [sqrt 1/2, sqrt 2).
+/// log2 of a positive normal number: exponent plus 2 atanh(s) / ln 2, s = (m - 1) / (m + 1), m in [sqrt 1/2, sqrt
+/// 2).
 double log2_positive(double x) {
   const uint64_t bits = std::bit_cast<uint64_t>(x);
   int exponent = static_cast<int>(bits >> 52) - 1023;
@@ -71,16 +73,21 @@ double exp2_bounded(double x) {
 
 SinCos sin_cos(float x) {
   if (!(std::fabs(x) <= 0x1p20f)) return {0, 1};
-  // pi/2 in two parts; the upper one has 33 bits, so that its product with a 20-bit integer is exact (Cody & Waite).
+  // pi/2 in two parts; the upper one has 33 bits, so that its product with a 20-bit integer is exact (Cody &
+  // Waite).
   constexpr double kHalfPiHigh = 0x1.921fb544p+0, kHalfPiLow = 0x1.0b4611a626331p-34;
   const double k = std::floor(static_cast<double>(x) * (2 / kPiDouble) + 0.5);
   const double r = (static_cast<double>(x) - k * kHalfPiHigh) - k * kHalfPiLow;
   const double s = sin_reduced(r), c = cos_reduced(r);
   switch (static_cast<int>(k) & 3) {
-    case 0: return {static_cast<float>(s), static_cast<float>(c)};
-    case 1: return {static_cast<float>(c), static_cast<float>(-s)};
-    case 2: return {static_cast<float>(-s), static_cast<float>(-c)};
-    default: return {static_cast<float>(-c), static_cast<float>(s)};
+    case 0:
+      return {static_cast<float>(s), static_cast<float>(c)};
+    case 1:
+      return {static_cast<float>(c), static_cast<float>(-s)};
+    case 2:
+      return {static_cast<float>(-s), static_cast<float>(-c)};
+    default:
+      return {static_cast<float>(-c), static_cast<float>(s)};
   }
 }
 

@@ -1,5 +1,5 @@
-// The few transcendental functions that a picture depends on, each implemented once from IEEE + - * / sqrt only: libm
-// picks its code by the processor, so its bits may differ between machines. Computed in double, rounded once;
+// The few transcendental functions that a picture depends on, each implemented once from IEEE + - * / sqrt only:
+// libm picks its code by the processor, so its bits may differ between machines. Computed in double, rounded once;
 // accuracy is stated here and swept in tests/engine. Called by camera, shading and film. Pure; 5 to 40 ns a call.
 #pragma once
 

@@ -1,7 +1,7 @@
 // The GGX microfacet distribution in the local frame of the shading normal (+z), isotropic, with height-correlated
-// Smith masking. Formulas: Walter et al. 2007 (D, Lambda), Heitz 2014 "Understanding the Masking-Shadowing Function"
-// eq. 99 (G2), Heitz 2018 eq. 17 (pdf of reflected visible normals), Dupuy & Benyoub 2023 listing 3 (sampling).
-// Called by engine/bsdf and engine/energy_table. Pure functions.
+// Smith masking. Formulas: Walter et al. 2007 (D, Lambda), Heitz 2014 "Understanding the Masking-Shadowing
+// Function" eq. 99 (G2), Heitz 2018 eq. 17 (pdf of reflected visible normals), Dupuy & Benyoub 2023 listing 3
+// (sampling). Called by engine/bsdf and engine/energy_table. Pure functions.
 #pragma once
 
 #include <cmath>
@@ -11,8 +11,8 @@
 namespace shoal {
 
 /// The smoothest lobe: below it a surface is shaded with this alpha, not as a delta. A half vector of rounded unit
-/// vectors is off by about 2^-23, which is 1e-4 of this lobe's width: D keeps three digits. One milliradian is below
-/// a pixel of a 1000-pixel, 60 degree picture, so that it still looks like a mirror.
+/// vectors is off by about 2^-23, which is 1e-4 of this lobe's width: D keeps three digits. One milliradian is
+/// below a pixel of a 1000-pixel, 60 degree picture, so that it still looks like a mirror.
 inline constexpr float kMinAlpha = 1e-3f;
 
 struct Ggx {

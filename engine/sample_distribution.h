@@ -16,7 +16,8 @@ namespace shoal {
 class Distribution1D {
  public:
   Distribution1D() = default;
-  /// Weights that are negative or not finite count as zero. When all are zero so is total(), and nothing may be drawn.
+  /// Weights that are negative or not finite count as zero. When all are zero so is total(), and nothing may be
+  /// drawn.
   explicit Distribution1D(std::span<const double> weights);
 
   double total() const { return total_; }  ///< sum of the weights

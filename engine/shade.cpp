@@ -39,8 +39,9 @@ double uniform53(uint32_t high, uint32_t low) {
 Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
     : scene_(&scene), tables_(&tables), options_(&options), textures_(scene.textures, cache) {}
 
-Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry, std::span<const std::byte> attributes,
-                         ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters) {
+Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
+                         std::span<const std::byte> attributes, ShadeResult& result, ShadeCounters& counters,
+                         CacheCounters& cache_counters) {
   result = {};
   path.shadow_radiance = Vec3(0);
   ++counters.vertices_shaded_count;
@@ -64,9 +65,8 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry, s
 Status Shader::add_emission(PathState& path, const Surface& surface, const Material& material,
                             ShadeCounters& counters, CacheCounters& cache_counters) {
   TextureContext context{textures_, cache_counters, counters.texture_lookups_count};
-  SHOAL_ASSIGN_OR_RETURN(
-      const Vec3 emission,
-      sample_emission(material, surface.uv(material.emissive_texture.uv_set), context));
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
+                         sample_emission(material, surface.uv(material.emissive_texture.uv_set), context));
   float weight = 1;
   const double area_pdf = tables_->impl().lights->emitter_pdf(material);
   if (path.bsdf_pdf > 0 && area_pdf > 0) {
@@ -83,9 +83,8 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
   const LightSampler& lights = *tables_->impl().lights;
   if (lights.empty()) return {};
   const Random4 random = path_random(path, options_->seed, Dimension::kLight);
-  const LightSample light =
-      lights.sample(surface.position.point, {uniform53(random.bits[0], random.bits[3]), random.uniform(1),
-                                             random.uniform(2)});
+  const LightSample light = lights.sample(
+      surface.position.point, {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)});
   if (!(light.pdf > 0)) return {};
   const BsdfValue f = bsdf.evaluate(light.direction);
   if (f.value == Vec3(0)) return {};
@@ -93,14 +92,13 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
   Vec3 radiance = light.radiance;
   if (light.emitter != nullptr) {
     TextureContext context{textures_, cache_counters, counters.texture_lookups_count};
-    SHOAL_ASSIGN_OR_RETURN(
-        const Vec3 emission,
-        sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, context));
+    SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
+                           sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, context));
     radiance *= emission;
   }
   const float weight = light.delta ? 1.0f : mis_weight(light.pdf, f.pdf);
-  add_radiance(path.shadow_radiance,
-               path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf), counters);
+  add_radiance(path.shadow_radiance, path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf),
+               counters);
   if (path.shadow_radiance == Vec3(0)) return {};
 
   result.has_shadow = true;

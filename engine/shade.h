@@ -26,8 +26,9 @@ struct EnvironmentOptions {
 };
 
 struct ShadingOptions {
-  /// Scattering events a path may have. Vertex k (PathState::bounce == k; the camera ray's hit is 0) sends a shadow ray
-  /// and a bounce only when k < bounces. 0: emission seen by the camera; 1: direct light; 2: one indirect bounce.
+  /// Scattering events a path may have. Vertex k (PathState::bounce == k; the camera ray's hit is 0) sends a shadow
+  /// ray and a bounce only when k < bounces. 0: emission seen by the camera; 1: direct light; 2: one indirect
+  /// bounce.
   uint32_t bounces = 8;
   uint32_t roulette_start = 3;  ///< the first vertex at which Russian roulette may end a path
   uint64_t seed = 0;

@@ -14,8 +14,11 @@ Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, con
                                                              const ShadingOptions& options) {
   auto impl = std::make_unique<Impl>();
   switch (options.environment.kind) {
-    case EnvironmentOptions::Kind::kNone: break;
-    case EnvironmentOptions::Kind::kConstant: impl->environment = Environment(options.environment.radiance); break;
+    case EnvironmentOptions::Kind::kNone:
+      break;
+    case EnvironmentOptions::Kind::kConstant:
+      impl->environment = Environment(options.environment.radiance);
+      break;
     case EnvironmentOptions::Kind::kImage: {
       SHOAL_ASSIGN_OR_RETURN(ImageF image, read_hdr_image(fs, options.environment.path, kMaxEnvironmentPixels));
       impl->environment = Environment(std::move(image));

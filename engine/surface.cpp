@@ -50,8 +50,8 @@ TangentFrame corner_tangents(const Surface& s) {
   return {tangent, glm::cross(s.front_normal, tangent) * (s.mirrored ? -s.handedness : s.handedness)};
 }
 
-/// Tangent along +u from dP = (dP/du) du + (dP/dv) dv on two edges. glTF's v runs down the picture and its normal maps
-/// have +y up: the bitangent is on the side of -dP/dv (Mikkelsen 2008, section 3, with the two per face).
+/// Tangent along +u from dP = (dP/du) du + (dP/dv) dv on two edges. glTF's v runs down the picture and its normal
+/// maps have +y up: the bitangent is on the side of -dP/dv (Mikkelsen 2008, section 3, with the two per face).
 TangentFrame uv_tangents(const Surface& s, uint32_t uv_set) {
   const CornerAttributes* c = s.attributes.corner;
   const glm::dvec2 d1 = glm::dvec2(c[1].uv[uv_set]) - glm::dvec2(c[0].uv[uv_set]);

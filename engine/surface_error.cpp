@@ -27,9 +27,9 @@ float next_float(float x, bool up) {
 
 BoundedPoint point_on_triangle(const Vec3& p0, const Vec3& p1, const Vec3& p2, float b1, float b2) {
   const Vec3 step1 = (p1 - p0) * b1, step2 = (p2 - p0) * b2;
-  // Roundings on the way: two in each step, two sums; one more because the bound is made of rounded steps. Traversal
-  // rounds the corners again when it takes them relative to a ray's origin and shears them (Woop 2013): the plane
-  // that it tests lies within gamma(4) of the largest corner distance, in any direction.
+  // Roundings on the way: two in each step, two sums; one more because the bound is made of rounded steps.
+  // Traversal rounds the corners again when it takes them relative to a ray's origin and shears them (Woop 2013):
+  // the plane that it tests lies within gamma(4) of the largest corner distance, in any direction.
   const Vec3 rounding = gamma_bound(5) * (glm::abs(p0) + glm::abs(step1) + glm::abs(step2));
   const Vec3 p = p0 + step1 + step2;
   const Vec3 reach = glm::max(glm::max(glm::abs(p0 - p), glm::abs(p1 - p)), glm::abs(p2 - p));

@@ -28,8 +28,9 @@ BoundedPoint to_world(const BoundedPoint& object_point, const Instance& instance
 /// For a world-space point that was not made by to_world(): the error of the way back, and of the way here.
 Vec3 instance_error(const Vec3& world_point, const Instance& instance);
 
-/// The far end of a ray from `origin` (t = 1): `target` with the error of the ray's own arithmetic added, which rounds
-/// origin, direction and t by parts of their lengths, once more in the space of `instance` (null: a point of no surface).
+/// The far end of a ray from `origin` (t = 1): `target` with the error of the ray's own arithmetic added, which
+/// rounds origin, direction and t by parts of their lengths, once more in the space of `instance` (null: a point of
+/// no surface).
 BoundedPoint ray_end(const BoundedPoint& target, const Vec3& origin, const Instance* instance);
 
 /// Moves a point along `normal` past its error bounds and one representable number further (PBRT 6.8.6).

@@ -23,9 +23,12 @@ const std::array<float, 256>& srgb_values() {
 float reduce(float u, WrapMode mode) {
   if (!std::isfinite(u)) return 0;
   switch (mode) {
-    case WrapMode::kRepeat: return u - std::floor(u);
-    case WrapMode::kMirroredRepeat: return u - 2 * std::floor(0.5f * u);
-    case WrapMode::kClampToEdge: break;
+    case WrapMode::kRepeat:
+      return u - std::floor(u);
+    case WrapMode::kMirroredRepeat:
+      return u - 2 * std::floor(0.5f * u);
+    case WrapMode::kClampToEdge:
+      break;
   }
   return std::clamp(u, 0.0f, 1.0f);
 }
@@ -40,12 +43,14 @@ PageId tile_page(const Texture& texture, uint32_t x, uint32_t y) {
 uint32_t wrap_texel(int64_t i, uint32_t size, WrapMode mode) {
   const int64_t n = size;
   switch (mode) {
-    case WrapMode::kRepeat: return static_cast<uint32_t>((i % n + n) % n);
+    case WrapMode::kRepeat:
+      return static_cast<uint32_t>((i % n + n) % n);
     case WrapMode::kMirroredRepeat: {
       const int64_t j = (i % (2 * n) + 2 * n) % (2 * n);
       return static_cast<uint32_t>(j < n ? j : 2 * n - 1 - j);
     }
-    case WrapMode::kClampToEdge: break;
+    case WrapMode::kClampToEdge:
+      break;
   }
   return static_cast<uint32_t>(std::clamp<int64_t>(i, 0, n - 1));
 }
@@ -73,8 +78,8 @@ Result<Vec4> TextureSampler::sample(uint32_t index, const Vec2& uv, CacheCounter
     add_tap(column, row + 1, (1 - fx) * fy), add_tap(column + 1, row + 1, fx * fy);
   }
 
-  // Every texel is fetched tile by tile, the pinned one first; the sum is then taken in the order of the taps, so that
-  // what is pinned cannot change a bit.
+  // Every texel is fetched tile by tile, the pinned one first; the sum is then taken in the order of the taps, so
+  // that what is pinned cannot change a bit.
   std::array<Vec4, 4> values;
   unsigned missing = (1u << tap_count) - 1;
   while (missing != 0) {

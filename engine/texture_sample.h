@@ -1,7 +1,7 @@
 // Texture look-ups through the page cache: level 0, bilinear or nearest, with glTF's wrap modes. uv (0, 0) is the
 // upper left corner of the upper left texel, v runs down. sRGB colours become linear before they are interpolated.
-// Called by engine/material_sample. One TextureSampler a thread; it keeps the tile read last pinned, never a second.
-// Cost: about 40 ns when the four texels lie in the tile that is pinned already.
+// Called by engine/material_sample. One TextureSampler a thread; it keeps the tile read last pinned, never a
+// second. Cost: about 40 ns when the four texels lie in the tile that is pinned already.
 #pragma once
 
 #include <cstdint>

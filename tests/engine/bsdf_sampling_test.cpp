@@ -25,8 +25,10 @@ struct Case {
   float mu;
 };
 std::vector<Case> cases() {
-  return {{{Vec3(0.8f), 0, 0.5f, 0, Vec3(1), 0.04f}, 0.6f},   {{Vec3(0.8f), 1, 0.6f, 1, Vec3(1), 0.04f}, 0.9f},
-          {{Vec3(0.9f), 1, 1.0f, 1, Vec3(1), 0.04f}, 0.2f},   {{Vec3(0.5f), 0, 0.7f, 1, Vec3(1), 0.04f}, 0.4f},
+  return {{{Vec3(0.8f), 0, 0.5f, 0, Vec3(1), 0.04f}, 0.6f},
+          {{Vec3(0.8f), 1, 0.6f, 1, Vec3(1), 0.04f}, 0.9f},
+          {{Vec3(0.9f), 1, 1.0f, 1, Vec3(1), 0.04f}, 0.2f},
+          {{Vec3(0.5f), 0, 0.7f, 1, Vec3(1), 0.04f}, 0.4f},
           {{Vec3(0.7f), 0.5f, 0.8f, 1, Vec3(1), 0.1f}, 0.7f}};
 }
 
@@ -151,8 +153,8 @@ TEST(BsdfSampling, NothingPassesThroughTheSurface) {
     for (uint32_t i = 0; i < 5000; ++i) {
       const BsdfSample s = draw(bsdf, i, 5);
       EXPECT_TRUE(s.pdf == 0 || glm::dot(s.direction, kNormal) > 0);
-      const Vec3 below = Frame(-kNormal).to_world(sample_cosine_hemisphere(
-          static_cast<float>(i) / 5000, static_cast<float>(i * 7 % 5000) / 5000));
+      const Vec3 below = Frame(-kNormal).to_world(
+          sample_cosine_hemisphere(static_cast<float>(i) / 5000, static_cast<float>(i * 7 % 5000) / 5000));
       EXPECT_EQ(bsdf.evaluate(below).value, Vec3(0));
     }
   }

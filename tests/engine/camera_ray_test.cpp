@@ -1,6 +1,6 @@
-#include "engine/camera.h"
-
 #include <gtest/gtest.h>
+
+#include "engine/camera.h"
 
 namespace shoal {
 namespace {

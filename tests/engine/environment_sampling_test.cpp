@@ -1,10 +1,9 @@
 // Environment pictures: orientation, filtering, distribution; and whole paths lit by one.
-#include "engine/environment.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "engine/environment.h"
 #include "engine/math.h"
 #include "engine/sampler.h"
 #include "io/image.h"

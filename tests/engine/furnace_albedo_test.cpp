@@ -73,8 +73,8 @@ TEST(Furnace, NoMixtureGainsEnergy) {
           for (const float mu : {0.06f, 0.4f, 0.95f}) {
             const MaterialSample m{Vec3(1), metallic, roughness, specular, Vec3(0.5f, 1, 3), f0};
             EXPECT_LE(max_component(material_albedo(m, mu)), 1.005f)
-                << "metallic " << metallic << ", roughness " << roughness << ", f0 " << f0 << ", specular " << specular
-                << ", mu " << mu;
+                << "metallic " << metallic << ", roughness " << roughness << ", f0 " << f0 << ", specular "
+                << specular << ", mu " << mu;
           }
         }
       }

@@ -15,8 +15,9 @@ using namespace testing;
 constexpr Vec3 kAlbedo(0.2f, 0.5f, 0.8f);
 constexpr Vec3 kLamp(3, 4, 5);
 
-/// Irradiance at the origin (normal +y) of a Lambertian rectangle [-a,a] x [-b,b] at height h, radiance 1: four times
-/// the view factor of a corner rectangle (Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-3).
+/// Irradiance at the origin (normal +y) of a Lambertian rectangle [-a,a] x [-b,b] at height h, radiance 1: four
+/// times the view factor of a corner rectangle (Howell, A Catalog of Radiation Heat Transfer Configuration Factors,
+/// B-3).
 double rectangle_irradiance(double a, double b, double h) {
   const double x = a / h, y = b / h, rx = std::sqrt(1 + x * x), ry = std::sqrt(1 + y * y);
   return 2 * (x / rx * std::atan(y / rx) + y / ry * std::atan(x / ry));
@@ -41,7 +42,8 @@ const Vec3 kEye(0.3f, 0.5f, -7);
 const Vec3 kDown = glm::normalize(-kEye);
 
 void expect_close(const Vec3& value, const Vec3& expected, float relative) {
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(value[c], expected[c], relative * std::abs(expected[c])) << "channel " << c;
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(value[c], expected[c], relative * std::abs(expected[c])) << "channel " << c;
 }
 
 TEST(LightTransport, ARectangleLightGivesItsClosedFormIrradiance) {
@@ -82,13 +84,14 @@ TEST(LightTransport, BouncesCountScatteringEvents) {
   ShadingScene s = floor_scene(1, 1, 1);
   s.prepare(with_bounces(0));
   EXPECT_EQ(s.radiance(kEye, kDown, 0, 0), Vec3(0));
-  EXPECT_EQ(s.radiance({0, 0.5f, 0}, {0, 1, 0}, 0, 0), kLamp);   // seen directly
-  EXPECT_EQ(s.radiance({0, 2, 0}, {0, -1, 0}, 0, 0), kLamp);     // and from behind
+  EXPECT_EQ(s.radiance({0, 0.5f, 0}, {0, 1, 0}, 0, 0), kLamp);  // seen directly
+  EXPECT_EQ(s.radiance({0, 2, 0}, {0, -1, 0}, 0, 0), kLamp);    // and from behind
   EXPECT_EQ(s.shadow_rays, 0);
 }
 
 TEST(LightTransport, TwoFacingPlatesGiveTheirGeometricSeries) {
-  // Two infinite (here very large) plates, one of them glowing: radiosity B1 = L + r B2, B2 = r B1 (black lamp: B2 = r L).
+  // Two infinite (here very large) plates, one of them glowing: radiosity B1 = L + r B2, B2 = r B1 (black lamp: B2
+  // = r L).
   TriangleSoup soup;
   add_rectangle(soup, {-500, 0, -500}, {1000, 0, 0}, {0, 0, 1000}, 0);
   add_rectangle(soup, {-500, 1, -500}, {1000, 0, 0}, {0, 0, 1000}, 1);
@@ -99,7 +102,8 @@ TEST(LightTransport, TwoFacingPlatesGiveTheirGeometricSeries) {
   options.roulette_start = 3;
   s.prepare(options);
   const float floor_radiance = 0.5f / (1 - 0.5f * 0.6f);
-  expect_close(s.mean_radiance({0, 0.5f, 0}, glm::normalize(Vec3(0.1f, -1, 0)), 20000), Vec3(floor_radiance), 0.02f);
+  expect_close(s.mean_radiance({0, 0.5f, 0}, glm::normalize(Vec3(0.1f, -1, 0)), 20000), Vec3(floor_radiance),
+               0.02f);
 }
 
 TEST(LightTransport, RussianRouletteChangesNothingOnAverage) {
@@ -135,7 +139,8 @@ TEST(LightTransport, ASpotFadesBetweenItsCones) {
   ShadingScene s = floor_scene(1, 1, 1, false);
   const float inner = std::cos(0.2f), outer = std::cos(0.4f);
   const auto brightness = [&](float angle) {
-    s.scene.lights = {{PunctualType::kSpot, {0, 1, 0}, {std::sin(angle), -std::cos(angle), 0}, {1, 1, 1}, inner, outer}};
+    s.scene.lights = {
+        {PunctualType::kSpot, {0, 1, 0}, {std::sin(angle), -std::cos(angle), 0}, {1, 1, 1}, inner, outer}};
     s.prepare(with_bounces(1));
     return s.radiance(kEye, kDown, 0, 0).x / (kAlbedo.x / kPi);
   };
@@ -170,7 +175,7 @@ TEST(LightTransport, AConstantSkyGivesPiTimesItsRadiance) {
 TEST(LightTransport, ATransformedSceneLooksTheSame) {
   TriangleSoup soup;
   const Affine3 m{{2, 0, 0}, {0.5f, 0.25f, 0}, {0, 0, -4}, {3, 5, -7}};  // sheared, scaled, mirrored
-  add_rectangle(soup, {-50, -20, -50}, {100, 0, 0}, {0, 0, 100}, 0);  // y = 0 in the world
+  add_rectangle(soup, {-50, -20, -50}, {100, 0, 0}, {0, 0, 100}, 0);     // y = 0 in the world
   add_rectangle(soup, {-2.75f, -16, -2}, {1, 0, 0}, {0, 0, 0.25f}, 1);
   ShadingScene s(std::move(soup), {matte(kAlbedo), lamp(kLamp)}, m);
   s.prepare(with_bounces(1));

@@ -1,10 +1,10 @@
 // Our transcendental functions against double libm, over dense sweeps.
-#include "engine/math.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+
+#include "engine/math.h"
 
 namespace shoal {
 namespace {
@@ -21,8 +21,8 @@ TEST(Math, SineAndCosineStayWithinTheirBoundOverAllAngles) {
 }
 
 TEST(Math, SineAndCosineAreFiniteForAnyArgument) {
-  for (const float x : {1e30f, -1e30f, std::numeric_limits<float>::infinity(),
-                        std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float x :
+       {1e30f, -1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
     EXPECT_EQ(sin_cos(x).sin, 0);
     EXPECT_EQ(sin_cos(x).cos, 1);
   }
@@ -34,7 +34,8 @@ TEST(Math, ArcTangentStaysWithinItsBoundInEveryQuadrant) {
     const double angle = (i - 50000) * (3.14159265 / 50000);
     const float radius = std::ldexp(1.0f, i % 60 - 30);
     const float y = static_cast<float>(std::sin(angle)) * radius, x = static_cast<float>(std::cos(angle)) * radius;
-    worst = std::max(worst, std::abs(arc_tangent(y, x) - std::atan2(static_cast<double>(y), static_cast<double>(x))));
+    worst =
+        std::max(worst, std::abs(arc_tangent(y, x) - std::atan2(static_cast<double>(y), static_cast<double>(x))));
   }
   EXPECT_LT(worst, 0x1p-21);
   EXPECT_EQ(arc_tangent(0, 0), 0);

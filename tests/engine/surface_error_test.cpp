@@ -1,4 +1,5 @@
-// New rays must not meet the triangle they leave, and shadow rays not the emitter they end on, through any transform.
+// New rays must not meet the triangle they leave, and shadow rays not the emitter they end on, through any
+// transform.
 #include "engine/surface_error.h"
 
 #include <gtest/gtest.h>
@@ -99,7 +100,8 @@ Rates measure(Shape shape, bool identity) {
     if (hits(offset_point(point, normal), out, kRayInfinity, c, instance, &hit)) ++rates.leaving;
 
     const BoundedPoint target = ray_end(aim, eye, &instance);
-    if (glm::dot(normal, eye - aim.point) < glm::dot(glm::abs(normal), target.error)) continue;  // closer than errors
+    if (glm::dot(normal, eye - aim.point) < glm::dot(glm::abs(normal), target.error))
+      continue;  // closer than errors
     if (hits(eye, offset_point(target, normal) - eye, 1, c, instance, &hit)) ++rates.arriving;
   }
   return rates;

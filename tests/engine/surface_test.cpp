@@ -32,7 +32,8 @@ TriangleSoup floor_triangle(CornerValues (*corner)(const Vec3& p), bool clockwis
     const float* p = soup.positions.data() + 3 * k;
     const CornerValues v = corner({p[0], p[1], p[2]});
     if (v.normal) soup.corners.insert(soup.corners.end(), {v.normal->x, v.normal->y, v.normal->z});
-    if (v.tangent) soup.corners.insert(soup.corners.end(), {v.tangent->x, v.tangent->y, v.tangent->z, v.tangent->w});
+    if (v.tangent)
+      soup.corners.insert(soup.corners.end(), {v.tangent->x, v.tangent->y, v.tangent->z, v.tangent->w});
     if (v.color) soup.corners.insert(soup.corners.end(), {v.color->x, v.color->y, v.color->z, v.color->w});
     if (v.uv) soup.corners.insert(soup.corners.end(), {v.uv->x, v.uv->y});
   }
@@ -43,7 +44,9 @@ CornerValues nothing(const Vec3&) { return {}; }
 CornerValues plain_uv(const Vec3& p) { return {{}, {}, {}, Vec2(p.x, p.z)}; }  // u right, v down, seen from above
 CornerValues mirrored_uv(const Vec3& p) { return {{}, {}, {}, Vec2(-p.x, p.z)}; }
 CornerValues with_tangents(const Vec3& p) { return {Vec3(0, 1, 0), Vec4(1, 0, 0, 1), {}, Vec2(p.x, p.z)}; }
-CornerValues with_left_handed_tangents(const Vec3& p) { return {Vec3(0, 1, 0), Vec4(-1, 0, 0, -1), {}, Vec2(-p.x, p.z)}; }
+CornerValues with_left_handed_tangents(const Vec3& p) {
+  return {Vec3(0, 1, 0), Vec4(-1, 0, 0, -1), {}, Vec2(-p.x, p.z)};
+}
 CornerValues colored(const Vec3& p) { return {{}, {}, Vec4(p.x, p.z, 0, 1), {}}; }
 CornerValues outward(const Vec3& p) { return {glm::normalize(Vec3(p.x, 6, p.z)), {}, {}, {}}; }
 

@@ -1,12 +1,11 @@
 // Texture look-ups against direct formulas on the texels, across tiles, wraps and encodings.
-#include "engine/texture_sample.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
 #include "engine/math.h"
+#include "engine/texture_sample.h"
 #include "tests/support/shading_scene.h"
 
 namespace shoal {
@@ -80,8 +79,8 @@ TEST(TextureLookup, IsBilinearUnderEveryWrapModeAndEncoding) {
 TEST(TextureLookup, TheOriginIsTheUpperLeftCornerAndNearestTakesOneTexel) {
   ShadingScene s = empty_scene();
   std::vector<uint8_t> texels(16 * 2 * 4, 0);
-  texels[0] = 255;                    // column 0 of the upper row
-  texels[(16 + 15) * 4 + 1] = 255;    // column 15 of the lower row
+  texels[0] = 255;                  // column 0 of the upper row
+  texels[(16 + 15) * 4 + 1] = 255;  // column 15 of the lower row
   const uint32_t index = s.add_texture(16, 2, texels, false);
   s.scene.textures[index].nearest = 1;
   s.prepare({});

@@ -1,5 +1,5 @@
-// Small scenes for tests of shading, kept in memory, and the plainest path tracer over them: one path at a time, one
-// ray after the other. Header only; for targets that link the engine.
+// Small scenes for tests of shading, kept in memory, and the plainest path tracer over them: one path at a time,
+// one ray after the other. Header only; for targets that link the engine.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -50,7 +50,8 @@ class ShadingScene {
     Result<BuiltObject> built = build_object(std::move(soup), {}, nullptr, sink);
     EXPECT_TRUE(built.ok());
     const BuiltObject& object = built.value();
-    for (const StoredTreelet& t : sink.treelets) geometry.emplace_back(t.geometry), attributes.emplace_back(t.attributes);
+    for (const StoredTreelet& t : sink.treelets)
+      geometry.emplace_back(t.geometry), attributes.emplace_back(t.attributes);
 
     // Node 0 is the tree over the one instance; the object's nodes follow.
     std::vector<TopNode> nodes{empty_top_node(kNoIndex, 0)};
@@ -125,8 +126,10 @@ class ShadingScene {
         break;
       }
       ShadeResult result;
-      EXPECT_TRUE(shader->shade_hit(path, geometry[ray.hit.treelet].bytes(), attributes[ray.hit.treelet].bytes(), result,
-                                    counters, cache_counters).ok());
+      EXPECT_TRUE(shader
+                      ->shade_hit(path, geometry[ray.hit.treelet].bytes(), attributes[ray.hit.treelet].bytes(),
+                                  result, counters, cache_counters)
+                      .ok());
       if (result.has_shadow) {
         ++shadow_rays;
         if (!trace(result.shadow_origin, result.shadow_direction, result.shadow_t_max, true).hit.valid()) {
