@@ -1,5 +1,6 @@
 // Rays a second through a scene in memory: our treelets against Embree's rtcIntersect1, incoherent rays, one thread.
-//   bench_trace [triangles, default 1000000] [rays, default 300000] [treelet KiB, default 256]
+//   bench_trace [triangles, default 1000000] [rays, default 300000] [treelet KiB, default 256] [soup|mesh]
+// soup: triangles that share nothing, about as large as their distance; mesh: nested bumpy spheres, vertices shared.
 // Prints a line a program: million rays a second, and for ours tests and treelets a ray. One warm-up, median of five.
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
@@ -92,10 +93,23 @@ void run_embree(const std::vector<TestTriangle>& triangles, const std::vector<Ra
   rtcReleaseDevice(device);
 }
 
-void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool embree) {
+/// Eight nested bumpy spheres.
+std::vector<TestTriangle> nested_spheres(size_t triangle_count) {
+  std::vector<TestTriangle> all;
+  const uint32_t rows = static_cast<uint32_t>(std::sqrt(static_cast<double>(triangle_count) / 32));
+  for (int shell = 1; shell <= 8; ++shell) {
+    for (TestTriangle t : closed_mesh(rows, 2 * rows, 0.2f, static_cast<uint32_t>(all.size()))) {
+      for (Vec3& p : t.p) p *= 0.1f * static_cast<float>(shell);
+      all.push_back(t);
+    }
+  }
+  return all;
+}
+
+void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool mesh) {
   std::mt19937 random(1);
   const float size = 2.0f / std::cbrt(static_cast<float>(triangle_count));
-  const auto soup = random_soup(random, triangle_count, size);
+  const auto soup = mesh ? nested_spheres(triangle_count) : random_soup(random, triangle_count, size);
   std::vector<Ray> rays;
   for (size_t i = 0; i < ray_count; ++i) rays.push_back(make_ray(random_vector(random), random_vector(random)));
   const TestScene scene = build_scene({soup}, {{0, {}}}, treelet_bytes);
@@ -104,13 +118,16 @@ void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool e
   fmt::print("{} triangles, {} treelets, {:.1f} bytes a triangle, {} top nodes\n", soup.size(), scene.pages.size(),
              static_cast<double>(bytes) / static_cast<double>(soup.size()), scene.nodes.size());
   run_ours(scene, rays);
-  if (embree) run_embree(soup, rays);
+  run_embree(soup, rays);
 }
 
 }  // namespace
 }  // namespace shoal::testing
 
 int main(int argc, char** argv) {
-  const auto number = [&](int i, unsigned long fallback) { return argc > i ? std::strtoul(argv[i], nullptr, 10) : fallback; };
-  shoal::testing::run(number(1, 1000000), number(2, 300000), static_cast<uint32_t>(number(3, 256)) << 10, number(4, 1) != 0);
+  const auto number = [&](int i, unsigned long fallback) {
+    return argc > i ? std::strtoul(argv[i], nullptr, 10) : fallback;
+  };
+  const bool mesh = argc > 4 && std::string(argv[4]) == "mesh";
+  shoal::testing::run(number(1, 1000000), number(2, 300000), static_cast<uint32_t>(number(3, 256)) << 10, mesh);
 }

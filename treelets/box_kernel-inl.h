@@ -33,10 +33,10 @@ HWY_INLINE uint32_t cross_boxes(const RaySpace& ray, float t, const Plane& plane
     };
     const auto far = [&](uint32_t axis) HWY_ATTR {
       return hn::Mul(hn::Sub(plane(ray.negative[axis] ^ 1, axis, first), hn::Set(f, ray.far_origin[axis])),
-                     hn::Set(f, ray.inverse[axis]));
+                     hn::Set(f, ray.far_inverse[axis]));
     };
     const auto t_near = hn::Max(hn::Max(near(1), near(0)), hn::Max(near(2), hn::Zero(f)));
-    const auto t_far = hn::Mul(hn::Min(far(2), hn::Min(far(1), far(0))), hn::Set(f, kFarScale));
+    const auto t_far = hn::Min(far(2), hn::Min(far(1), far(0)));
     const auto entered = hn::And(hn::Le(t_near, t_far), hn::Le(t_near, hn::Set(f, t)));
     const auto key = hn::Or(hn::And(hn::BitCast(u, t_near), hn::Set(u, kKeyMask)),
                             hn::Iota(u, static_cast<uint32_t>(first)));

@@ -1,5 +1,5 @@
-// The ray-box test: three slabs (Kay & Kajiya 1986) with the ray widened by RaySpace::pad and the far result enlarged
-// by 1 + 2 gamma(3) (Ize 2013, "Robust BVH Ray Traversal", section 3). Scalar form; the SIMD kernels do the same
+// The ray-box test: three slabs (Kay & Kajiya 1986) with the ray widened by RaySpace::pad and the far results enlarged
+// by kFarScale (Ize 2013). Scalar form; the SIMD kernels do the same
 // operations in the same order.
 //
 // Monotone: every operation is a rounded monotone function of the planes. So if box A lies inside box B, then
@@ -14,9 +14,6 @@
 
 namespace shoal {
 
-/// 1 + 2 gamma(3) = 1 + 6u (1 + O(u)), rounded up to the next float but one.
-inline constexpr float kFarScale = 0x1.000008p0f;
-
 struct BoxSpan {
   float t_near;  ///< >= 0
   float t_far;
@@ -30,11 +27,11 @@ inline BoxSpan cross_box(const RaySpace& ray, const float lo[3], const float hi[
     const float near_plane = ray.negative[axis] ? hi[axis] : lo[axis];
     const float far_plane = ray.negative[axis] ? lo[axis] : hi[axis];
     near[axis] = (near_plane - ray.near_origin[axis]) * ray.inverse[axis];
-    far[axis] = (far_plane - ray.far_origin[axis]) * ray.inverse[axis];
+    far[axis] = (far_plane - ray.far_origin[axis]) * ray.far_inverse[axis];
   }
   BoxSpan span;
   span.t_near = std::max(0.0f, std::max(near[2], std::max(near[1], near[0])));
-  span.t_far = std::min(far[2], std::min(far[1], far[0])) * kFarScale;
+  span.t_far = std::min(far[2], std::min(far[1], far[0]));
   return span;
 }
 

@@ -30,10 +30,15 @@ inline constexpr float kRoundingUnit = 0x1p-24f;
 inline constexpr float kObjectPad = 12 * kRoundingUnit;
 inline constexpr float kWorldPad = 40 * kRoundingUnit;
 
+/// 1 + 2 gamma(3) = 1 + 6u (1 + O(u)) (Ize 2013, "Robust BVH Ray Traversal", section 3), and one more rounding in
+/// far_inverse: 7u, rounded up to a float.
+inline constexpr float kFarScale = 0x1.000008p0f;
+
 struct RaySpace {
   float origin[3];
   float direction[3];
   float inverse[3];       ///< 1 / direction, clamped to +-FLT_MAX, so that (plane - origin) * inverse is never NaN
+  float far_inverse[3];   ///< inverse * kFarScale, clamped alike
   float near_origin[3];   ///< origin moved by pad so that near planes come earlier
   float far_origin[3];    ///< origin moved by pad so that far planes come later
   uint32_t negative[3];   ///< 1: the ray runs towards smaller coordinates: hi is the near plane
@@ -61,6 +66,7 @@ inline RaySpace prepare_ray(const Vec3& origin, const Vec3& direction) {
     ray.origin[axis] = origin[axis];
     ray.direction[axis] = direction[axis];
     ray.inverse[axis] = std::min(std::max(1.0f / direction[axis], -kMax), kMax);
+    ray.far_inverse[axis] = std::min(std::max(ray.inverse[axis] * kFarScale, -kMax), kMax);
     ray.negative[axis] = std::signbit(direction[axis]) ? 1 : 0;
   }
   const float ax = std::abs(direction.x), ay = std::abs(direction.y), az = std::abs(direction.z);

@@ -21,6 +21,11 @@ class TraversalStack {
       mask &= mask - 1;
       return uint64_t{keys[slot]} << 32 | child[slot];
     };
+    if ((mask & (mask - 1)) == 0) {  // one child: its key is not waited for
+      next = child[std::countr_zero(mask)];
+      foresee(next);
+      return true;
+    }
     uint64_t nearest = take();
     const uint32_t base = size_;
     while (mask != 0) {
