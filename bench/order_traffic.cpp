@@ -158,6 +158,6 @@ int main(int argc, char** argv) {
   app.add_flag("--short", arguments.brief, "a small scene and one run, to see that it works");
   app.add_option("--json", arguments.json, "the rows as JSON");
   CLI11_PARSE(app, argc, argv);
-  if (arguments.brief) arguments.triangles = 100'000, arguments.runs = 1, arguments.side = 128, arguments.samples = 2;
+  if (arguments.brief) arguments.triangles = 100'000, arguments.runs = 1, arguments.side = 32, arguments.samples = 1;
   return run(arguments);
 }

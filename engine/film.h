@@ -1,6 +1,6 @@
 // The film: where the radiance of finished paths is remembered. Sums are kept in 128-bit fixed point (64 bits of
 // fraction), so that adding is exact and any order gives the same bits, for 1e-10 beside 1e10.
-// Called by engine/render_*. Threads: any number; a striped lock guards a pixel. Cost: 48 bytes a pixel.
+// Called by engine/render_*. Threads: any number; a striped lock guards a pixel. Cost: 56 bytes a pixel.
 #pragma once
 
 #include <cstdint>

@@ -50,10 +50,11 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   plan.cap_bytes = execution.max_memory_bytes;
   if (plan.cap_bytes == 0) plan.cap_bytes = memory_limit_bytes() / 10 * 7;
   plan.process_bytes = resident_set_bytes();
-  // The sums, the resolved floats, and a copy of them while the files are written.
-  plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 48;
+  // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
+  plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 4 * sizeof(float);
   // A thread: its stack, the block in hand, a page as stored (direct reads need their own buffer).
-  plan.scratch_bytes = 8 * kMiB + threads * (1 * kMiB + largest_page_bytes(*scene.file) + 2 * kPageAlignment);
+  plan.scratch_bytes = 8 * kMiB + threads * (1 * kMiB + largest_page_bytes(*scene.file) + 2 * kPageAlignment) +
+                       PageCache::overhead_bytes(*scene.file);
   plan.scene_page_bytes = all_page_bytes(*scene.file);
   const uint64_t least_cache = PageCache::minimum_capacity_bytes(*scene.file, threads);
 

@@ -10,6 +10,11 @@
 namespace shoal {
 namespace {
 
+/// What a texture tile counts for when pages are evicted, in rays: nothing waits for a tile by name, but dropping tiles
+/// first read 1.7 times the bytes and 8 times the pages of dropping treelets with fewer waiting rays before them
+/// (demo scene, 480 x 270, 2 spp, cap 80M; 1024 instead of 64 made no difference).
+constexpr uint64_t kTextureTileWork = 64;
+
 Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
   if (picture.width == 0 || picture.height == 0 || picture.width > 65536 || picture.height > 65536 ||
       uint64_t{picture.width} * picture.height >= (1ull << 31)) {
@@ -63,7 +68,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
     paths = std::make_unique<QueuedPaths>(static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight,
                                           execution.threads);
     waiting = [&paths, treelets = treelet_of_pages(scene)](PageId page) -> uint64_t {
-      return treelets[page] == kNoIndex ? 0 : paths->waiting(treelets[page]);
+      return treelets[page] == kNoIndex ? kTextureTileWork : paths->waiting(treelets[page]);
     };
   }
   PageCache cache(*scene.file, plan.cache_bytes,
