@@ -1,10 +1,11 @@
-// Rays a second through a scene in memory: our treelets against Embree's rtcIntersect1, incoherent rays, one thread.
+// Rays a second through a scene in memory: our treelets against Embree's rtcIntersect1, incoherent rays, one
+// thread.
 //   bench_trace [triangles, default 1000000] [rays, default 300000] [treelet KiB, default 256] [soup|mesh]
-// soup: triangles that share nothing, about as large as their distance; mesh: nested bumpy spheres, vertices shared.
-// Prints a line a program: million rays a second, and for ours tests and treelets a ray. One warm-up, median of five.
+// soup: triangles that share nothing, about as large as their distance; mesh: nested bumpy spheres, vertices
+// shared. Prints a line a program: million rays a second, and for ours tests and treelets a ray. One warm-up,
+// median of five.
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
-
 #include <time.h>
 
 #include <cstdlib>
@@ -49,10 +50,11 @@ void run_ours(const TestScene& scene, const std::vector<Ray>& rays) {
     }
   });
   const double n = static_cast<double>(rays.size());
-  fmt::print("ours    {:.3f} Mrays/s  hits {:.3f}  top nodes {:.1f}  treelets {:.2f}  nodes {:.1f}  triangles {:.1f}\n",
-             n / seconds * 1e-6, static_cast<double>(hits) / n, static_cast<double>(top_tests) / n,
-             static_cast<double>(visits) / n, static_cast<double>(counters.node_tests_count) / n,
-             static_cast<double>(counters.triangle_tests_count) / n);
+  fmt::print(
+      "ours    {:.3f} Mrays/s  hits {:.3f}  top nodes {:.1f}  treelets {:.2f}  nodes {:.1f}  triangles {:.1f}\n",
+      n / seconds * 1e-6, static_cast<double>(hits) / n, static_cast<double>(top_tests) / n,
+      static_cast<double>(visits) / n, static_cast<double>(counters.node_tests_count) / n,
+      static_cast<double>(counters.triangle_tests_count) / n);
 }
 
 void run_embree(const std::vector<TestTriangle>& triangles, const std::vector<Ray>& rays) {
@@ -60,10 +62,10 @@ void run_embree(const std::vector<TestTriangle>& triangles, const std::vector<Ra
   RTCScene scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   RTCGeometry mesh = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
-                                                               3 * triangles.size()));
-  auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12,
-                                                                 triangles.size()));
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3 * triangles.size()));
+  auto* indices = static_cast<uint32_t*>(
+      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
   for (size_t i = 0; i < 3 * triangles.size(); ++i) {
     std::memcpy(vertices + 3 * i, &triangles[i / 3].p[i % 3], 12);
     indices[i] = static_cast<uint32_t>(i);

@@ -1,5 +1,5 @@
-// The ray against 8 boxes at once, on every instruction set of Highway: the operations of cross_box() in box_test.h, in
-// its order, without fusing. Included once a target by the kernels (foreach_target.h).
+// The ray against 8 boxes at once, on every instruction set of Highway: the operations of cross_box() in
+// box_test.h, in its order, without fusing. Included once a target by the kernels (foreach_target.h).
 #if defined(SHOAL_TREELETS_BOX_KERNEL_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SHOAL_TREELETS_BOX_KERNEL_INL_H
 #undef SHOAL_TREELETS_BOX_KERNEL_INL_H
@@ -38,8 +38,8 @@ HWY_INLINE uint32_t cross_boxes(const RaySpace& ray, float t, const Plane& plane
     const auto t_near = hn::Max(hn::Max(near(1), near(0)), hn::Max(near(2), hn::Zero(f)));
     const auto t_far = hn::Min(far(2), hn::Min(far(1), far(0)));
     const auto entered = hn::And(hn::Le(t_near, t_far), hn::Le(t_near, hn::Set(f, t)));
-    const auto key = hn::Or(hn::And(hn::BitCast(u, t_near), hn::Set(u, kKeyMask)),
-                            hn::Iota(u, static_cast<uint32_t>(first)));
+    const auto key =
+        hn::Or(hn::And(hn::BitCast(u, t_near), hn::Set(u, kKeyMask)), hn::Iota(u, static_cast<uint32_t>(first)));
     hn::StoreU(key, u, keys + first);
     uint8_t bits[8] = {};
     hn::StoreMaskBits(f, entered, bits);

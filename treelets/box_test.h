@@ -1,10 +1,9 @@
-// The ray-box test: three slabs (Kay & Kajiya 1986) with the ray widened by RaySpace::pad and the far results enlarged
-// by kFarScale (Ize 2013). Scalar form; the SIMD kernels do the same
-// operations in the same order.
+// The ray-box test: three slabs (Kay & Kajiya 1986) with the ray widened by RaySpace::pad and the far results
+// enlarged by kFarScale (Ize 2013). Scalar form; the SIMD kernels do the same operations in the same order.
 //
 // Monotone: every operation is a rounded monotone function of the planes. So if box A lies inside box B, then
-// t_near(B) <= t_near(A) and t_far(A) <= t_far(B) in the computed values, and what enters A enters B. A hit counts only
-// if the triangle's own box is entered and its t is clamped to that box's span; hence every box above it is
+// t_near(B) <= t_near(A) and t_far(A) <= t_far(B) in the computed values, and what enters A enters B. A hit counts
+// only if the triangle's own box is entered and its t is clamped to that box's span; hence every box above it is
 // entered too, and the shape of the BVH cannot change the picture.
 #pragma once
 
@@ -39,15 +38,19 @@ inline BoxSpan cross_box(const RaySpace& ray, const float lo[3], const float hi[
 inline constexpr int kMinGridPower = -126;
 
 /// 2^exponent. Requires: exponent >= kMinGridPower.
-inline float power_of_two(int8_t exponent) { return std::bit_cast<float>(static_cast<uint32_t>(exponent + 127) << 23); }
+inline float power_of_two(int8_t exponent) {
+  return std::bit_cast<float>(static_cast<uint32_t>(exponent + 127) << 23);
+}
 
 /// A plane of a QuantizedNode: an exact product and one rounded sum, hence monotone in q.
 inline float dequantize(float origin, float step, uint8_t q) { return origin + static_cast<float>(q) * step; }
 
-/// The order in which children are entered: t of entry without its last three bits, then slot. As integers, so that it
-/// is total whatever the ray. Requires: t_near >= 0.
+/// The order in which children are entered: t of entry without its last three bits, then slot. As integers, so that
+/// it is total whatever the ray. Requires: t_near >= 0.
 inline constexpr uint32_t kKeyMask = 0x7ffffff8u;  // also clears the sign of -0
-inline uint32_t entry_key(float t_near, uint32_t slot) { return (std::bit_cast<uint32_t>(t_near) & kKeyMask) | slot; }
+inline uint32_t entry_key(float t_near, uint32_t slot) {
+  return (std::bit_cast<uint32_t>(t_near) & kKeyMask) | slot;
+}
 inline float key_t(uint32_t key) { return std::bit_cast<float>(key & kKeyMask); }
 
 }  // namespace shoal

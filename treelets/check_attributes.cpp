@@ -12,7 +12,8 @@ Error corrupt(std::string message) { return {ErrorCode::kCorrupt, "attribute pag
 
 /// An array of `bytes` at `offset` lies between the header and the end of the page.
 Status check_array(std::span<const std::byte> page, const char* name, uint64_t offset, uint64_t bytes) {
-  if (offset % 4 == 0 && offset >= sizeof(AttributeHeader) && bytes <= page.size() && offset <= page.size() - bytes) {
+  if (offset % 4 == 0 && offset >= sizeof(AttributeHeader) && bytes <= page.size() &&
+      offset <= page.size() - bytes) {
     return {};
   }
   return corrupt(fmt::format("{}: {} bytes at {} do not fit in {}", name, bytes, offset, page.size()));
@@ -35,7 +36,8 @@ Status check_header(std::span<const std::byte> page) {
   if (h.index_bytes != 2 && h.index_bytes != 4) {
     return corrupt(fmt::format("indices of {} bytes, expected 2 or 4", h.index_bytes));
   }
-  SHOAL_RETURN_IF_ERROR(check_array(page, "indices", h.indices_offset, uint64_t{3} * h.triangle_count * h.index_bytes));
+  SHOAL_RETURN_IF_ERROR(
+      check_array(page, "indices", h.indices_offset, uint64_t{3} * h.triangle_count * h.index_bytes));
   return check_array(page, "vertices", h.vertices_offset, uint64_t{4} * h.vertex_count * view.layout().floats());
 }
 
@@ -48,7 +50,8 @@ Status check_attributes(std::span<const std::byte> page) {
   if (h.vertex_count == 0) return {};
   for (uint64_t corner = 0; corner < uint64_t{3} * h.triangle_count; ++corner) {
     if (view.vertex_index(corner) >= h.vertex_count) {
-      return corrupt(fmt::format("corner {} names vertex {} of {}", corner, view.vertex_index(corner), h.vertex_count));
+      return corrupt(
+          fmt::format("corner {} names vertex {} of {}", corner, view.vertex_index(corner), h.vertex_count));
     }
   }
   const uint64_t floats = uint64_t{h.vertex_count} * view.layout().floats();

@@ -61,8 +61,8 @@ Status check_child(const Tables& tables, uint32_t index, uint32_t slot, ChildKin
                        : kind == ChildKind::kEntry ? tables.entries.size()
                                                    : tables.instances.size();
   if ((kind != ChildKind::kNode && kind != wanted) || child >= limit) {
-    return corrupt(fmt::format("node {}, child {}: kind {}, index {} of {}", index, slot, static_cast<int>(kind), child,
-                               limit));
+    return corrupt(fmt::format("node {}, child {}: kind {}, index {} of {}", index, slot, static_cast<int>(kind),
+                               child, limit));
   }
   if (kind == ChildKind::kInstance && tables.instances[child].tree_child != (index << 3 | slot)) {
     return corrupt(fmt::format("node {}, child {}: instance {} has another parent", index, slot, child));

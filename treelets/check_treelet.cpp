@@ -23,25 +23,29 @@ Status check_header(std::span<const std::byte> page) {
     return corrupt(fmt::format("expected at least {} bytes, found {}", sizeof(TreeletHeader), page.size()));
   }
   const TreeletHeader& h = *reinterpret_cast<const TreeletHeader*>(page.data());
-  if (h.magic != kTreeletMagic) return corrupt(fmt::format("magic: expected {:#x}, found {:#x}", kTreeletMagic, h.magic));
+  if (h.magic != kTreeletMagic)
+    return corrupt(fmt::format("magic: expected {:#x}, found {:#x}", kTreeletMagic, h.magic));
   const uint64_t nodes_end = sizeof(TreeletHeader) + uint64_t{h.node_count} * sizeof(QuantizedNode);
   const uint64_t leaves_end = uint64_t{h.leaves_offset} + h.leaves_bytes;
   const uint64_t primitives_end = uint64_t{h.primitives_offset} + uint64_t{4} * h.triangle_count;
   if (h.leaves_offset % 4 != 0 || h.leaves_offset < nodes_end || leaves_end > page.size()) {
-    return corrupt(fmt::format("leaves at {}, {} bytes, do not fit between {} nodes and the end at {}", h.leaves_offset,
-                               h.leaves_bytes, h.node_count, page.size()));
+    return corrupt(fmt::format("leaves at {}, {} bytes, do not fit between {} nodes and the end at {}",
+                               h.leaves_offset, h.leaves_bytes, h.node_count, page.size()));
   }
   if (h.primitives_offset % 4 != 0 || h.primitives_offset < leaves_end || primitives_end > page.size()) {
-    return corrupt(fmt::format("{} primitive ids at {} do not fit between the leaves' end at {} and the page's at {}",
-                               h.triangle_count, h.primitives_offset, leaves_end, page.size()));
+    return corrupt(
+        fmt::format("{} primitive ids at {} do not fit between the leaves' end at {} and the page's at {}",
+                    h.triangle_count, h.primitives_offset, leaves_end, page.size()));
   }
-  if (h.leaves_bytes / 4 >= 1u << 27) return corrupt(fmt::format("{} bytes of leaves are too many", h.leaves_bytes));
+  if (h.leaves_bytes / 4 >= 1u << 27)
+    return corrupt(fmt::format("{} bytes of leaves are too many", h.leaves_bytes));
   if (h.coverage_offset == 0) return {};
   const uint64_t coverage_end = uint64_t{h.coverage_offset} + uint64_t{4} * h.triangle_count +
                                 uint64_t{h.coverage_record_count} * sizeof(CoverageRecord) + h.coverage_texel_bytes;
   if (h.coverage_offset % 4 != 0 || h.coverage_offset < primitives_end || coverage_end > page.size()) {
-    return corrupt(fmt::format("coverage at {} does not fit between the primitive ids' end at {} and the page's at {}",
-                               h.coverage_offset, primitives_end, page.size()));
+    return corrupt(
+        fmt::format("coverage at {} does not fit between the primitive ids' end at {} and the page's at {}",
+                    h.coverage_offset, primitives_end, page.size()));
   }
   return {};
 }
@@ -61,7 +65,8 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
     return corrupt(fmt::format("leaf at {} ends past the {} bytes of leaves", at, h.leaves_bytes));
   }
   for (uint32_t i = 0; i < 3 * vertices; ++i) {
-    if (!std::isfinite(leaf.axis(0)[i])) return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
+    if (!std::isfinite(leaf.axis(0)[i]))
+      return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
   }
   for (uint32_t i = 0; i < 3 * triangles; ++i) {
     if (leaf.corner(0)[i] >= vertices) {
@@ -99,7 +104,8 @@ Status check_nodes(const TreeletView& treelet) {
     if (node.child_count > 8) return corrupt(fmt::format("node {} has {} children", index, node.child_count));
     for (uint32_t slot = 0; slot < node.child_count; ++slot) {
       const NodeRef ref = node.child[slot];
-      if (ref == kEmptyRef) return corrupt(fmt::format("node {} has an empty slot {} among its children", index, slot));
+      if (ref == kEmptyRef)
+        return corrupt(fmt::format("node {} has an empty slot {} among its children", index, slot));
       if (depth[index] + 1u > kMaxTreeletDepth) return corrupt(fmt::format("node {} lies too deep", index));
       if (is_leaf(ref)) {
         SHOAL_RETURN_IF_ERROR(check_leaf(treelet, leaf_offset(ref)));
@@ -130,8 +136,8 @@ Status check_record(const TreeletHeader& h, const CoverageRecord& record, uint32
   const uint64_t texels = uint64_t{record.crop_width} * record.crop_height;
   if (record.crop_width > kMaxLevelTexels || record.crop_height > kMaxLevelTexels || texels == 0 ||
       record.texel_offset + texels > h.coverage_texel_bytes) {
-    return corrupt(fmt::format("coverage record {}: {} x {} texels at {} do not fit in {}", index, record.crop_width,
-                               record.crop_height, record.texel_offset, h.coverage_texel_bytes));
+    return corrupt(fmt::format("coverage record {}: {} x {} texels at {} do not fit in {}", index,
+                               record.crop_width, record.crop_height, record.texel_offset, h.coverage_texel_bytes));
   }
   return {};
 }

@@ -41,7 +41,8 @@ Axis resolve(float x, int32_t crop_first, uint32_t size, WrapMode mode, bool who
 float texture_alpha(const CoverageRecord& record, const uint8_t* texels, float u, float v) {
   const bool whole = record.whole_level != 0, nearest = record.nearest != 0;
   const Axis x = resolve(u, record.crop_x, record.crop_width, static_cast<WrapMode>(record.wrap_u), whole, nearest);
-  const Axis y = resolve(v, record.crop_y, record.crop_height, static_cast<WrapMode>(record.wrap_v), whole, nearest);
+  const Axis y =
+      resolve(v, record.crop_y, record.crop_height, static_cast<WrapMode>(record.wrap_v), whole, nearest);
   const auto texel = [&](int i, int j) {
     return static_cast<float>(texels[record.texel_offset + size_t{y.texel[j]} * record.crop_width + x.texel[i]]);
   };
@@ -69,7 +70,8 @@ float coverage_alpha(const CoverageRecord& record, const uint8_t* texels, float 
   float alpha = record.factor * (b0 * va[0] + b1 * va[1] + b2 * va[2]);
   if (record.crop_width != 0) {
     const float* uv = record.uv;
-    alpha *= texture_alpha(record, texels, b0 * uv[0] + b1 * uv[2] + b2 * uv[4], b0 * uv[1] + b1 * uv[3] + b2 * uv[5]);
+    alpha *=
+        texture_alpha(record, texels, b0 * uv[0] + b1 * uv[2] + b2 * uv[4], b0 * uv[1] + b1 * uv[3] + b2 * uv[5]);
   }
   return alpha;
 }

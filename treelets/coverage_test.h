@@ -8,8 +8,8 @@
 
 namespace shoal {
 
-/// Uniform in [0, 1), from the upper 24 bits of the first word of pcg3d (Jarzynski & Olano 2020, "Hash Functions for
-/// GPU Rendering", JCGT 9(3)) of (alpha_seed, instance, primitive).
+/// Uniform in [0, 1), from the upper 24 bits of the first word of pcg3d (Jarzynski & Olano 2020, "Hash Functions
+/// for GPU Rendering", JCGT 9(3)) of (alpha_seed, instance, primitive).
 float coverage_threshold(uint32_t alpha_seed, uint32_t instance, uint32_t primitive);
 
 /// alpha = factor * vertex alpha * texture alpha; the texture bilinearly, or the texel that holds the point.

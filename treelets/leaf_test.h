@@ -23,8 +23,8 @@ inline bool passes_coverage(const TreeletView& treelet, const Ray& ray, const Tr
   const uint32_t record = treelet.coverage_of()[ordinal];
   if (record == kNoIndex) return true;
   ++counters.coverage_tests_count;
-  return is_covered(treelet.coverage_records()[record], treelet.coverage_texels(), hit, ray.alpha_seed, ray.instance,
-                    primitive);
+  return is_covered(treelet.coverage_records()[record], treelet.coverage_texels(), hit, ray.alpha_seed,
+                    ray.instance, primitive);
 }
 
 /// Tests triangle `i` of the leaf at `offset`. Returns true when an any-hit ray is done.

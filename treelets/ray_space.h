@@ -3,20 +3,25 @@
 //
 // The pads below are bounds on the error of our own arithmetic. With u = 2^-24 (rounding of one float operation),
 // R = max|origin| + B, B the largest absolute coordinate of the object:
-//   triangle test (Woop, Benthin & Wald 2013): translation errs by u R, the shear S by u |S| with |S| <= 1, so the
-//     sheared vertex p_x - S p_z errs by (1 + 3 + 2) u R = 6 u R. An accepted ray meets a triangle that is the true
-//     one with its corners moved by at most 6 u R an axis.
-//   box test: origin +- pad, (plane - origin), 1/d and the product, each rounded once: 4 u R as a position.
-// So boxes widened by 10 u R hold every hit that the triangle test accepts; kObjectPad = 12 u also covers the rounding
-// of the pad itself and the terms of order u^2. FLT_MIN is added for products that underflow.
+//
+// - triangle test (Woop, Benthin & Wald 2013): translation errs by u R, the shear S by u |S| with |S| <= 1, so the
+//   sheared vertex p_x - S p_z errs by (1 + 3 + 2) u R = 6 u R. An accepted ray meets a triangle that is the true
+//   one with its corners moved by at most 6 u R an axis;
+// - box test: origin +- pad, (plane - origin), 1/d and the product, each rounded once: 4 u R as a position.
+//
+// So boxes widened by 10 u R hold every hit that the triangle test accepts; kObjectPad = 12 u also covers the
+// rounding of the pad itself and the terms of order u^2. FLT_MIN is added for products that underflow.
 //
 // The tree over instances is tested in world space, the hit was decided in object space. With M the object to world
-// matrix, L its linear part, T its translation, N the stored inverse, K >= ||L| |N|| (Instance::transform_error) and
-// W <= E the extent of the instance in the world, E = |T| + |L| B (row sums), the world point of a hit errs by
-//   5 u K (|o| + |T|)   the transformed origin (four products and sums, entries of N rounded once; Higham 2002, (3.5))
-//   4 u K (W + |o|)     the transformed direction, times t <= (W + |o|) / |d|
-//   22 u (K (|o| + |T|) + |L| B)   the object's pad 12 u, and 10 u of slab arithmetic and its enlargement kFarScale
-//   4 u E + 4 u (|o| + W)          the corners of the instance's box, and the slabs in world space
+// matrix, L its linear part, T its translation, N the stored inverse, K >= ||L| |N|| (Instance::transform_error)
+// and W <= E the extent of the instance in the world, E = |T| + |L| B (row sums), the world point of a hit errs by
+//
+// - 5 u K (|o| + |T|), the transformed origin: four products and sums, entries of N rounded once (Higham
+// 2002, 3.5);
+// - 4 u K (W + |o|), the transformed direction, times t <= (W + |o|) / |d|;
+// - 22 u (K (|o| + |T|) + |L| B), the object's pad 12 u, and 10 u of slab arithmetic and its enlargement kFarScale;
+// - 4 u E + 4 u (|o| + W), the corners of the instance's box, and the slabs in world space;
+//
 // which is below 40 u K (|o| + E): kWorldPad.
 #pragma once
 
@@ -37,13 +42,13 @@ inline constexpr float kFarScale = 0x1.000008p0f;
 struct RaySpace {
   float origin[3];
   float direction[3];
-  float inverse[3];       ///< 1 / direction, clamped to +-FLT_MAX, so that (plane - origin) * inverse is never NaN
-  float far_inverse[3];   ///< inverse * kFarScale, clamped alike
-  float near_origin[3];   ///< origin moved by pad so that near planes come earlier
-  float far_origin[3];    ///< origin moved by pad so that far planes come later
-  uint32_t negative[3];   ///< 1: the ray runs towards smaller coordinates: hi is the near plane
-  uint32_t kx, ky, kz;    ///< kz: axis along which the direction is longest
-  float shear_x, shear_y; ///< d[kx] / d[kz], d[ky] / d[kz]
+  float inverse[3];        ///< 1 / direction, clamped to +-FLT_MAX, so that (plane - origin) * inverse is never NaN
+  float far_inverse[3];    ///< inverse * kFarScale, clamped alike
+  float near_origin[3];    ///< origin moved by pad so that near planes come earlier
+  float far_origin[3];     ///< origin moved by pad so that far planes come later
+  uint32_t negative[3];    ///< 1: the ray runs towards smaller coordinates: hi is the near plane
+  uint32_t kx, ky, kz;     ///< kz: axis along which the direction is longest
+  float shear_x, shear_y;  ///< d[kx] / d[kz], d[ky] / d[kz]
   float pad;
 };
 
@@ -92,8 +97,8 @@ inline RaySpace to_object_space(const Ray& ray, const Instance& instance) {
   return object;
 }
 
-/// What a worker keeps of the ray in hand between calls, so that one ray's transforms and reciprocals are computed once
-/// a space. Requires: reset() before another ray, or another origin or direction.
+/// What a worker keeps of the ray in hand between calls, so that one ray's transforms and reciprocals are computed
+/// once a space. Requires: reset() before another ray, or another origin or direction.
 struct RayContext {
   RaySpace world, object;
   uint32_t object_instance = kNoIndex;  ///< whose space `object` is; kNoIndex: not prepared

@@ -1,7 +1,9 @@
+// clang-format off: the order of these lines matters
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "treelets/top_tree.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
+// clang-format on
 
 #include "treelets/box_kernel-inl.h"
 #include "treelets/ray_space.h"
@@ -30,6 +32,66 @@ inline const RaySpace& space_of(const TopTreeTables& tree, const Ray& ray, RayCo
   }
   return context.world;
 }
+
+/// Where a walk stands: before the children of a node, or behind one of them.
+struct TopPlace {
+  uint32_t node, slot;
+  uint32_t base;  ///< level in the whole path of the root of the tree that the node is in
+  bool again;     ///< the node is met again, on the way up: go on behind `slot`
+  const RaySpace* space;
+};
+
+inline TopPlace place_of_cursor(const TopTreeTables& tree, Ray& ray, RayContext& context) {
+  TopPlace place{ray.cursor >> 3, ray.cursor & 7, 0, ray.cursor != kNoIndex, nullptr};
+  if (!place.again) {
+    ray.instance = tree.single_identity ? 0 : kNoIndex;
+    place.node = tree.single_identity ? tree.instances[0].root_node : 0;
+  }
+  if (ray.instance != kNoIndex && !tree.single_identity) {
+    place.base = tree.nodes[tree.instances[ray.instance].tree_child >> 3].level + 1;
+  }
+  place.space = &space_of(tree, ray, context);
+  return place;
+}
+
+/// To the parent, from an object's tree to the tree over instances; false at the root of all.
+inline bool climb(const TopTreeTables& tree, Ray& ray, RayContext& context, TopPlace& place) {
+  uint32_t parent = tree.nodes[place.node].parent;
+  if (parent == kNoIndex) {
+    if (ray.instance == kNoIndex || tree.single_identity) return false;
+    parent = tree.instances[ray.instance].tree_child;
+    ray.instance = kNoIndex;
+    place.base = 0;
+    place.space = &space_of(tree, ray, context);
+  }
+  place.node = parent >> 3, place.slot = parent & 7, place.again = true;
+  return true;
+}
+
+/// Into the child in `slot`; true when it is an entry, where the walk rests.
+inline bool descend(const TopTreeTables& tree, Ray& ray, RayContext& context, TopPlace& place, uint32_t slot) {
+  const TopNode& node = tree.nodes[place.node];
+  const uint32_t child = node.child[slot];
+  place.slot = slot, place.again = false;
+  switch (node.kind[slot]) {
+    case ChildKind::kEntry:
+      ray.cursor = place.node << 3 | slot;
+      return true;
+    case ChildKind::kNode:
+      place.node = child;
+      break;
+    case ChildKind::kInstance:
+      ray.instance = child;
+      place.base += node.level + 1;
+      place.node = tree.instances[child].root_node;
+      place.space = &space_of(tree, ray, context);
+      break;
+    case ChildKind::kEmpty:  // never entered in a well-formed tree
+      place.again = true;
+      break;
+  }
+  return false;
+}
 }  // namespace shoal
 #endif
 
@@ -38,14 +100,13 @@ namespace shoal {
 namespace HWY_NAMESPACE {
 
 HWY_INLINE uint32_t cross_top_node(const RaySpace& ray, const TopNode& node, float t, uint32_t keys[8]) {
-  const auto plane = [&](uint32_t side, uint32_t axis, size_t first) HWY_ATTR {
-    return hn::Load(F8(), (side ? node.hi : node.lo)[axis] + first);
-  };
+  const auto plane = [&](uint32_t side, uint32_t axis, size_t first)
+                         HWY_ATTR { return hn::Load(F8(), (side ? node.hi : node.lo)[axis] + first); };
   return cross_boxes(ray, t, plane, keys);
 }
 
-/// The key of the next child to enter: the smallest of `mask`, above `after` when the node is met again; kNoIndex: none.
-/// Sets `more` to whether others are left behind it.
+/// The key of the next child to enter: the smallest of `mask`, above `after` when the node is met again; kNoIndex:
+/// none. Sets `more` to whether others are left behind it.
 HWY_INLINE uint32_t choose_child(const uint32_t keys[8], uint32_t mask, bool again, uint32_t after, bool& more) {
   uint32_t best = kNoIndex, count = 0;
   for (; mask != 0; mask &= mask - 1) {
@@ -59,63 +120,24 @@ HWY_INLINE uint32_t choose_child(const uint32_t keys[8], uint32_t mask, bool aga
 }
 
 uint32_t next_entry(const TopTreeTables& tree, Ray& ray, RayContext& context, uint64_t& node_tests) {
-  const auto base_level = [&] {
-    return ray.instance == kNoIndex || tree.single_identity
-               ? 0
-               : tree.nodes[tree.instances[ray.instance].tree_child >> 3].level + 1;
-  };
-  bool again = ray.cursor != kNoIndex;
-  uint32_t node_index = ray.cursor >> 3, slot = ray.cursor & 7;
-  if (!again) {
-    ray.instance = tree.single_identity ? 0 : kNoIndex;
-    node_index = tree.single_identity ? tree.instances[0].root_node : 0;
-  }
-  uint32_t base = base_level();
-  const RaySpace* space = &space_of(tree, ray, context);
+  TopPlace place = place_of_cursor(tree, ray, context);
   for (;;) {
-    const TopNode& node = tree.nodes[node_index];
-    const uint32_t level = base + node.level;
+    const TopNode& node = tree.nodes[place.node];
+    const uint32_t level = place.base + node.level;
     const uint32_t bit = level < tree.more_levels ? 1u << level : 0;
     uint32_t key = kNoIndex;
-    if (!again || bit == 0 || (ray.more & bit) != 0) {
+    if (!place.again || bit == 0 || (ray.more & bit) != 0) {
       ++node_tests;
       uint32_t keys[8];
-      const uint32_t mask = cross_top_node(*space, node, ray.t, keys);
+      const uint32_t mask = cross_top_node(*place.space, node, ray.t, keys);
       bool more;
-      key = choose_child(keys, mask, again, keys[slot], more);
+      key = choose_child(keys, mask, place.again, keys[place.slot], more);
       ray.more = more ? ray.more | bit : ray.more & ~bit;
     }
-    if (key == kNoIndex) {  // up
-      uint32_t parent = node.parent;
-      if (parent == kNoIndex) {
-        if (ray.instance == kNoIndex || tree.single_identity) break;
-        parent = tree.instances[ray.instance].tree_child;
-        ray.instance = kNoIndex;
-        base = 0;
-        space = &space_of(tree, ray, context);
-      }
-      node_index = parent >> 3, slot = parent & 7, again = true;
-      continue;
-    }
-    slot = key & 7;
-    const uint32_t child = node.child[slot];
-    again = false;
-    switch (node.kind[slot]) {
-      case ChildKind::kEntry:
-        ray.cursor = node_index << 3 | slot;
-        return child;
-      case ChildKind::kNode:
-        node_index = child;
-        break;
-      case ChildKind::kInstance:
-        ray.instance = child;
-        base = level + 1;
-        node_index = tree.instances[child].root_node;
-        space = &space_of(tree, ray, context);
-        break;
-      case ChildKind::kEmpty:  // never entered in a well-formed tree
-        again = true;
-        break;
+    if (key == kNoIndex) {
+      if (!climb(tree, ray, context, place)) break;
+    } else if (descend(tree, ray, context, place, key & 7)) {
+      return node.child[key & 7];
     }
   }
   ray.cursor = kNoIndex, ray.instance = kNoIndex, ray.more = 0;

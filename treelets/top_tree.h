@@ -10,8 +10,8 @@
 // Boxes: lo/hi are the children's bounds in float. The test (treelets/box_test.h) widens the ray by
 // RaySpace::pad, so that whatever the triangle test accepts, every box above it accepts.
 //
-// At every node the children that the ray enters are taken in the order of entry_key() (treelets/box_test.h: t of entry
-// without its last three bits, then slot), which depends on ray and node alone.
+// At every node the children that the ray enters are taken in the order of entry_key() (treelets/box_test.h: t of
+// entry without its last three bits, then slot), which depends on ray and node alone.
 #pragma once
 
 #include <cstdint>
@@ -44,15 +44,15 @@ struct TreeletEntry {
 };
 static_assert(sizeof(TreeletEntry) == 8);
 
-struct Instance {           // 128 bytes, as stored
+struct Instance {  // 128 bytes, as stored
   Affine3 object_to_world;
   Affine3 world_to_object;  ///< computed in double, rounded once
   uint32_t root_node;       ///< global index of the object's root node
   uint32_t tree_child;      ///< (node << 3 | slot) of the tree over instances that leads here
   uint32_t identity;        ///< 1: world and object space are the same bits
   uint32_t object;
-  float transform_error;    ///< K of docs/design.md "Numerics": max row sum of |M| |M^-1|, 1 for identity
-  float max_abs_coordinate; ///< of the object's bounds, object space
+  float transform_error;     ///< K of docs/design.md "Numerics": max row sum of |M| |M^-1|, 1 for identity
+  float max_abs_coordinate;  ///< of the object's bounds, object space
   uint32_t reserved[2];
 };
 static_assert(sizeof(Instance) == 128);
@@ -91,7 +91,7 @@ class TopTree {
   std::span<const TopNode> nodes() const { return nodes_; }
   std::span<const TreeletEntry> entries() const { return entries_; }
   std::span<const Instance> instances() const { return instances_; }
-  Bounds3 bounds() const;          ///< of the scene, world space
+  Bounds3 bounds() const;  ///< of the scene, world space
   uint64_t resident_bytes() const;
 
  private:
@@ -99,9 +99,9 @@ class TopTree {
   std::vector<TreeletEntry> entries_;
   std::vector<Instance> instances_;
   TraversalOptions options_;
-  float world_pad_scale_ = 0;    ///< kWorldPad times the largest transform_error; see ray_space.h
-  float world_extent_ = 0;       ///< E of ray_space.h, the largest of all instances
-  bool single_identity_ = false; ///< one instance whose space is the world: its tree is entered at once
+  float world_pad_scale_ = 0;     ///< kWorldPad times the largest transform_error; see ray_space.h
+  float world_extent_ = 0;        ///< E of ray_space.h, the largest of all instances
+  bool single_identity_ = false;  ///< one instance whose space is the world: its tree is entered at once
 };
 
 }  // namespace shoal

@@ -1,7 +1,9 @@
+// clang-format off: the order of these lines matters
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "treelets/trace_treelet.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
+// clang-format on
 
 #include <hwy/cache_control.h>
 
@@ -55,7 +57,8 @@ HWY_INLINE hn::Vec<F8> lower_eight(hn::Vec<hn::CappedTag<float, 16>> v) {
 
 /// The sheared corners of the leaf's triangles, a lane a triangle: vertices are sheared once and then looked up in
 /// registers. Lanes past the last triangle hold anything.
-HWY_INLINE void gather_corners(const RaySpace& ray, const LeafView& leaf, size_t, ShearedVec<hn::Vec<F8>> corner[3]) {
+HWY_INLINE void gather_corners(const RaySpace& ray, const LeafView& leaf, size_t,
+                               ShearedVec<hn::Vec<F8>> corner[3]) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> di;
   constexpr size_t kLanes = HWY_MAX_BYTES >= 64 ? 16 : 8;
@@ -111,8 +114,8 @@ HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf) {
       const auto p1 = hn::Mul(corner[from[e]].x, corner[to[e]].y);
       const auto p2 = hn::Mul(corner[from[e]].y, corner[to[e]].x);
       const auto value = hn::Sub(p1, p2);
-      const auto bound = hn::Add(hn::Mul(hn::Set(f, kEdgeError), hn::Add(hn::Abs(p1), hn::Abs(p2))),
-                                 hn::Set(f, kEdgeUnderflow));
+      const auto bound =
+          hn::Add(hn::Mul(hn::Set(f, kEdgeError), hn::Add(hn::Abs(p1), hn::Abs(p2))), hn::Set(f, kEdgeUnderflow));
       positive = hn::Or(positive, hn::Gt(value, bound));
       negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
     }

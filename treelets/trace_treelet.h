@@ -14,7 +14,7 @@
 namespace shoal {
 
 struct TraceCounters {
-  uint64_t node_tests_count = 0;      ///< 8-wide nodes tested, in treelets and top tree
+  uint64_t node_tests_count = 0;  ///< 8-wide nodes tested, in treelets and top tree
   uint64_t triangle_tests_count = 0;
   uint64_t coverage_tests_count = 0;
 };
@@ -22,8 +22,8 @@ struct TraceCounters {
 /// Crosses treelet `treelet` (its decoded geometry page) from `entry.root` in the space of `instance`.
 /// Closest hit: ray.t and ray.hit become the smallest (t, instance, primitive) so far.
 /// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
-/// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the page
-/// (as in PagePin::bytes), `instance` is the one that ray.instance names.
+/// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the
+/// page (as in PagePin::bytes), `instance` is the one that ray.instance names.
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
                    TraceCounters& counters);
 /// The same for a worker that keeps `context` while it has this ray in hand (treelets/ray_space.h).
@@ -33,15 +33,16 @@ void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, c
 /// Checks every offset and count of a geometry page from a file, so that trace_treelet and find_triangle cannot
 /// read outside it or loop. Run once when a page is decoded. Fails with: kCorrupt.
 Status check_treelet(std::span<const std::byte> page);
-/// Checks that a TreeletEntry's root lies in the page. Requires: the page passed check_treelet(). Fails with: kCorrupt.
+/// Checks that a TreeletEntry's root lies in the page. Requires: the page passed check_treelet(). Fails with:
+/// kCorrupt.
 Status check_root(std::span<const std::byte> page, uint32_t root);
 
 /// One triangle of a treelet by Hit::slot, for shading.
 struct TreeletTriangle {
-  Vec3 p0, p1, p2;      ///< object space
+  Vec3 p0, p1, p2;  ///< object space
   uint32_t primitive;
-  uint32_t ordinal;     ///< index of the triangle in the treelet; indexes the attribute page
-  uint32_t material;    ///< of the page when uniform, else kNoIndex: see the attribute page
+  uint32_t ordinal;   ///< index of the triangle in the treelet; indexes the attribute page
+  uint32_t material;  ///< of the page when uniform, else kNoIndex: see the attribute page
 };
 /// Requires: slot comes from a hit in this page.
 TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot);

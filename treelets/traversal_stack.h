@@ -1,5 +1,5 @@
-// The stack of one traversal inside a treelet: what is still to visit, the nearest on top. Fixed in size: at each of at
-// most kMaxTreeletDepth levels at most 7 siblings wait.
+// The stack of one traversal inside a treelet: what is still to visit, the nearest on top. Fixed in size: at each
+// of at most kMaxTreeletDepth levels at most 7 siblings wait.
 #pragma once
 
 #include <utility>
@@ -11,8 +11,8 @@ namespace shoal {
 
 class TraversalStack {
  public:
-  /// Goes on to the nearest of the children of one node that the ray enters (a bit each in `mask`) and leaves the others
-  /// waiting; false when there is none. `foresee` is told of each of them, to prefetch it.
+  /// Goes on to the nearest of the children of one node that the ray enters (a bit each in `mask`) and leaves the
+  /// others waiting; false when there is none. `foresee` is told of each of them, to prefetch it.
   template <class Foresee>
   bool enter(const uint32_t keys[8], const NodeRef child[8], uint32_t mask, NodeRef& next, const Foresee& foresee) {
     if (mask == 0) return false;

@@ -1,5 +1,5 @@
-// A decoded geometry page seen through its layout (treelets/treelet_layout.h): pointers into the page, nothing copied.
-// Made by whoever reads a treelet. Requires: the page passed check_treelet(). Cost: a few additions.
+// A decoded geometry page seen through its layout (treelets/treelet_layout.h): pointers into the page, nothing
+// copied. Made by whoever reads a treelet. Requires: the page passed check_treelet(). Cost: a few additions.
 #pragma once
 
 #include <cstddef>

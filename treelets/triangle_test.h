@@ -1,7 +1,7 @@
-// The ray-triangle test: watertight (Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection"), both sides.
-// The corners are translated and sheared in float, alike for every triangle that shares them; then the signs of the
-// three edge functions are decided exactly: in float where the rounding error cannot change the sign, else in double,
-// where products of floats are exact. Scalar; the SIMD kernel only rejects what this certainly rejects.
+// The ray-triangle test: watertight (Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection"), both
+// sides. The corners are translated and sheared in float, alike for every triangle that shares them; then the signs
+// of the three edge functions are decided exactly: in float where the rounding error cannot change the sign, else
+// in double, where products of floats are exact. Scalar; the SIMD kernel only rejects what this certainly rejects.
 //
 // Error of an edge function e = p1 - p2 of two rounded products (u = 2^-24; the subtraction keeps the sign):
 // |(p1 - p2) - exact| <= u (|p1| + |p2|) + 2^-149, and the sum below is itself rounded; 2u and FLT_MIN cover both.
@@ -27,7 +27,8 @@ struct Sheared {
 
 inline Sheared shear(const RaySpace& ray, const Vec3& p) {
   const float z = p[ray.kz] - ray.origin[ray.kz];
-  return {(p[ray.kx] - ray.origin[ray.kx]) - ray.shear_x * z, (p[ray.ky] - ray.origin[ray.ky]) - ray.shear_y * z, z};
+  return {(p[ray.kx] - ray.origin[ray.kx]) - ray.shear_x * z, (p[ray.ky] - ray.origin[ray.ky]) - ray.shear_y * z,
+          z};
 }
 
 template <class T>
@@ -47,9 +48,9 @@ inline double exact_edge(const Sheared& a, const Sheared& b) {
   return static_cast<double>(a.x) * b.y - static_cast<double>(a.y) * b.x;
 }
 
-/// The line of the ray meets the triangle: sets t (any sign, unclamped, perhaps NaN) and the weights. Those come from the
-/// exact edge functions: in float their error, divided by the area that the ray sees, moves t of a sliver or of
-/// a grazing ray by far more than the error of the corners, and a ray would meet the triangle that it leaves.
+/// The line of the ray meets the triangle: sets t (any sign, unclamped, perhaps NaN) and the weights. Those come
+/// from the exact edge functions: in float their error, divided by the area that the ray sees, moves t of a sliver
+/// or of a grazing ray by far more than the error of the corners, and a ray would meet the triangle that it leaves.
 inline bool cross_line(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2, TriangleHit& hit) {
   const Sheared a = shear(ray, p0), b = shear(ray, p1), c = shear(ray, p2);
   bool certain[3];

@@ -34,8 +34,8 @@ inline uint32_t append_object(TestScene& scene, const BuiltObject& object) {
   return base;
 }
 
-inline TestScene build_scene(std::vector<std::vector<TestTriangle>> objects, const std::vector<Placement>& placements,
-                             uint32_t treelet_bytes) {
+inline TestScene build_scene(std::vector<std::vector<TestTriangle>> objects,
+                             const std::vector<Placement>& placements, uint32_t treelet_bytes) {
   TestScene scene;
   std::vector<BuiltObject> built;
   PageSink sink(scene.pages);

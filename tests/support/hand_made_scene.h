@@ -1,195 +1,18 @@
-// Scenes packed by hand for tests of traversal: median splits into 8-wide nodes, pages in the layout of
-// treelets/treelet_layout.h, written independently of the product's builder. Also the brute force that
+// Scenes packed by hand for tests of traversal, carried through as an engine does, and the brute force that
 // traversal is compared with. Header only, so that every test target may include it.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <functional>
-#include <memory>
-#include <random>
 #include <vector>
 
+#include "tests/support/hand_made_page.h"
+#include "tests/support/test_meshes.h"
 #include "treelets/leaf_test.h"
 #include "treelets/ray_space.h"
 #include "treelets/top_tree.h"
 #include "treelets/trace_treelet.h"
-#include "treelets/treelet_layout.h"
 #include "treelets/triangle_test.h"
 
 namespace shoal::testing {
-
-struct TestTriangle {
-  Vec3 p[3];
-  uint32_t primitive = 0;
-  bool operator==(const TestTriangle&) const = default;
-};
-
-inline Bounds3 bounds_of(const TestTriangle& t) {
-  Bounds3 b;
-  for (const Vec3& p : t.p) b.include(p);
-  return b;
-}
-inline Bounds3 bounds_of(std::span<const TestTriangle> triangles) {
-  Bounds3 b;
-  for (const TestTriangle& t : triangles) b.include(bounds_of(t));
-  return b;
-}
-inline float max_abs_of(const Bounds3& b) { return std::max(max_abs(&b.lo.x), max_abs(&b.hi.x)); }
-
-/// A page of bytes aligned to 64 with 64 readable bytes after its end, as the page cache gives them.
-class AlignedPage {
- public:
-  explicit AlignedPage(std::span<const std::byte> bytes) : size_(bytes.size()), lines_((bytes.size() + 127) / 64) {
-    if (size_ > 0) std::memcpy(lines_.data(), bytes.data(), size_);
-  }
-  std::span<const std::byte> bytes() const { return {reinterpret_cast<const std::byte*>(lines_.data()), size_}; }
-  std::span<std::byte> mutable_bytes() { return {reinterpret_cast<std::byte*>(lines_.data()), size_}; }
-
- private:
-  struct alignas(64) Line {
-    std::byte bytes[64] = {};
-  };
-  size_t size_;
-  std::vector<Line> lines_;
-};
-
-/// Splits [0, n) at the median of the centroids' longest axis into up to 8 parts.
-inline std::vector<std::span<TestTriangle>> split_in_eight(std::span<TestTriangle> all, size_t leaf_size) {
-  std::vector<std::span<TestTriangle>> parts{all};
-  while (parts.size() < 8) {
-    const auto largest = std::max_element(parts.begin(), parts.end(),
-                                          [](const auto& a, const auto& b) { return a.size() < b.size(); });
-    if (largest->size() <= leaf_size) break;
-    const std::span<TestTriangle> part = *largest;
-    const Vec3 e = bounds_of(part).extent();
-    const int axis = e.x > e.y ? (e.x > e.z ? 0 : 2) : (e.y > e.z ? 1 : 2);
-    const size_t half = part.size() / 2;
-    std::nth_element(part.begin(), part.begin() + static_cast<long>(half), part.end(), [axis](const auto& a, const auto& b) {
-      return a.p[0][axis] + a.p[1][axis] + a.p[2][axis] < b.p[0][axis] + b.p[1][axis] + b.p[2][axis];
-    });
-    *largest = part.first(half);
-    parts.push_back(part.subspan(half));
-  }
-  return parts;
-}
-
-class PagePacker {
- public:
-  explicit PagePacker(size_t leaf_size) : leaf_size_(leaf_size) {}
-
-  /// Packs `triangles` and returns the root. Several roots may share the page.
-  NodeRef add(std::span<TestTriangle> triangles) {
-    if (triangles.size() <= leaf_size_) return add_leaf(triangles);
-    const uint32_t index = static_cast<uint32_t>(nodes_.size());
-    nodes_.push_back({});
-    const auto parts = split_in_eight(triangles, leaf_size_);
-    QuantizedNode node = quantize(parts);
-    for (size_t slot = 0; slot < parts.size(); ++slot) node.child[slot] = add(parts[slot]);
-    nodes_[index] = node;
-    return index;
-  }
-
-  /// Appends coverage: `record_of` a triangle's primitive (kNoIndex: opaque). Call before add().
-  void set_coverage(std::vector<CoverageRecord> records, std::vector<uint8_t> texels,
-                    std::function<uint32_t(uint32_t)> record_of) {
-    records_ = std::move(records), texels_ = std::move(texels), record_of_ = std::move(record_of);
-  }
-
-  std::vector<std::byte> finish() const {
-    TreeletHeader h{};
-    h.magic = kTreeletMagic;
-    h.node_count = static_cast<uint32_t>(nodes_.size());
-    h.leaves_offset = static_cast<uint32_t>(sizeof h + nodes_.size() * sizeof(QuantizedNode));
-    h.leaves_bytes = static_cast<uint32_t>(leaves_.size());
-    h.triangle_count = static_cast<uint32_t>(primitives_.size());
-    h.primitives_offset = h.leaves_offset + h.leaves_bytes;
-    std::vector<std::byte> page;
-    append(page, &h, 1);
-    append(page, nodes_.data(), nodes_.size());
-    append(page, leaves_.data(), leaves_.size());
-    append(page, primitives_.data(), primitives_.size());
-    if (!record_of_) return page;
-    h.coverage_offset = static_cast<uint32_t>(page.size());
-    h.coverage_record_count = static_cast<uint32_t>(records_.size());
-    h.coverage_texel_bytes = static_cast<uint32_t>(texels_.size());
-    std::memcpy(page.data(), &h, sizeof h);
-    for (const uint32_t primitive : primitives_) {
-      const uint32_t record = record_of_(primitive);
-      append(page, &record, 1);
-    }
-    append(page, records_.data(), records_.size());
-    append(page, texels_.data(), texels_.size());
-    return page;
-  }
-
- private:
-  template <class T>
-  static void append(std::vector<std::byte>& out, const T* values, size_t count) {
-    const size_t at = out.size();
-    out.resize(at + count * sizeof(T));
-    if (count > 0) std::memcpy(out.data() + at, values, count * sizeof(T));
-  }
-
-  NodeRef add_leaf(std::span<const TestTriangle> triangles) {
-    const uint32_t offset = static_cast<uint32_t>(leaves_.size() / 4);
-    std::vector<Vec3> vertices;
-    std::vector<uint8_t> corner[3];
-    LeafHeader header{};
-    header.triangle_count = static_cast<uint8_t>(triangles.size());
-    header.first_ordinal = static_cast<uint32_t>(primitives_.size());
-    for (const TestTriangle& t : triangles) {
-      for (int k = 0; k < 3; ++k) {
-        const auto same_bits = [&](const Vec3& v) { return std::memcmp(&v, &t.p[k], sizeof v) == 0; };
-        const auto found = std::find_if(vertices.begin(), vertices.end(), same_bits);
-        corner[k].push_back(static_cast<uint8_t>(found - vertices.begin()));
-        if (found == vertices.end()) vertices.push_back(t.p[k]);
-      }
-      primitives_.push_back(t.primitive);
-      if (record_of_ && record_of_(t.primitive) != kNoIndex) header.has_coverage = 1;
-    }
-    header.vertex_count = static_cast<uint8_t>(vertices.size());
-    append(leaves_, &header, 1);
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const Vec3& v : vertices) append(leaves_, &v[axis], 1);
-    }
-    for (const auto& c : corner) append(leaves_, c.data(), c.size());
-    leaves_.resize((leaves_.size() + 3) / 4 * 4);
-    return kLeafBit | offset;
-  }
-
-  static QuantizedNode quantize(const std::vector<std::span<TestTriangle>>& parts) {
-    QuantizedNode node{};
-    node.child_count = static_cast<uint8_t>(parts.size());
-    std::fill(std::begin(node.child), std::end(node.child), kEmptyRef);
-    std::fill(&node.lo[0][0], &node.lo[0][0] + 24, uint8_t{255});
-    Bounds3 all;
-    for (const auto& part : parts) all.include(bounds_of(part));
-    for (int axis = 0; axis < 3; ++axis) {
-      node.origin[axis] = all.lo[axis];
-      int e = -126;
-      while (dequantize(all.lo[axis], std::ldexp(1.0f, e), 255) < all.hi[axis]) ++e;
-      node.exponent[axis] = static_cast<int8_t>(e);
-      for (size_t slot = 0; slot < parts.size(); ++slot) {
-        const Bounds3 b = bounds_of(parts[slot]);
-        uint8_t lo = 255, hi = 0;
-        while (lo > 0 && dequantize(node.origin[axis], std::ldexp(1.0f, e), lo) > b.lo[axis]) --lo;
-        while (hi < 255 && dequantize(node.origin[axis], std::ldexp(1.0f, e), hi) < b.hi[axis]) ++hi;
-        node.lo[axis][slot] = lo, node.hi[axis][slot] = hi;
-      }
-    }
-    return node;
-  }
-
-  size_t leaf_size_;
-  std::vector<QuantizedNode> nodes_;
-  std::vector<std::byte> leaves_;
-  std::vector<uint32_t> primitives_;
-  std::vector<CoverageRecord> records_;
-  std::vector<uint8_t> texels_;
-  std::function<uint32_t(uint32_t)> record_of_;
-};
 
 /// Objects, instances and their treelets.
 struct TestScene {
@@ -203,7 +26,7 @@ struct TestScene {
 struct TestSceneOptions {
   size_t treelet_triangles = 1000;  ///< about, a treelet
   size_t leaf_size = 4;
-  bool reversed = false;            ///< pack the triangles the other way round
+  bool reversed = false;  ///< pack the triangles the other way round
 };
 
 inline TopNode empty_top_node(uint32_t parent, uint32_t level) {
@@ -224,8 +47,8 @@ inline void set_child(TopNode& node, uint32_t slot, ChildKind kind, uint32_t chi
 }
 
 /// Adds the tree of one object; returns its root.
-inline uint32_t add_object_tree(TestScene& scene, std::span<TestTriangle> triangles, uint32_t parent, uint32_t level,
-                                const TestSceneOptions& options) {
+inline uint32_t add_object_tree(TestScene& scene, std::span<TestTriangle> triangles, uint32_t parent,
+                                uint32_t level, const TestSceneOptions& options) {
   const uint32_t index = static_cast<uint32_t>(scene.nodes.size());
   scene.nodes.push_back(empty_top_node(parent, level));
   const auto parts = split_in_eight(triangles, options.treelet_triangles);
@@ -320,8 +143,8 @@ inline void fill_instance_node(TestScene& scene, uint32_t index, uint32_t first,
   }
 }
 
-inline TestScene make_scene(std::vector<std::vector<TestTriangle>> objects, const std::vector<Placement>& placements,
-                            const TestSceneOptions& options = {}) {
+inline TestScene make_scene(std::vector<std::vector<TestTriangle>> objects,
+                            const std::vector<Placement>& placements, const TestSceneOptions& options = {}) {
   TestScene scene;
   scene.nodes.push_back(empty_top_node(kNoIndex, 0));
   std::vector<uint32_t> roots;
@@ -342,7 +165,8 @@ inline TestScene make_scene(std::vector<std::vector<TestTriangle>> objects, cons
   return scene;
 }
 
-using TraceFunction = void (*)(std::span<const std::byte>, const TreeletEntry&, const Instance&, Ray&, TraceCounters&);
+using TraceFunction = void (*)(std::span<const std::byte>, const TreeletEntry&, const Instance&, Ray&,
+                               TraceCounters&);
 
 /// Carries one ray through the whole scene, as an engine does.
 inline void trace_scene(const TopTree& tree, std::span<const AlignedPage> pages, Ray& ray, TraceFunction trace,
@@ -372,44 +196,6 @@ inline void brute_force(const TestScene& scene, Ray& ray) {
       ray.t = hit.t;
     }
   }
-}
-
-inline Vec3 random_vector(std::mt19937& random, float scale = 1) {
-  std::uniform_real_distribution<float> uniform(-scale, scale);
-  const float x = uniform(random), y = uniform(random), z = uniform(random);
-  return {x, y, z};
-}
-
-/// `count` triangles about `size` large in [-1, 1]^3.
-inline std::vector<TestTriangle> random_soup(std::mt19937& random, size_t count, float size, uint32_t first_primitive = 0) {
-  std::vector<TestTriangle> soup(count);
-  for (size_t i = 0; i < count; ++i) {
-    const Vec3 centre = random_vector(random);
-    for (Vec3& p : soup[i].p) p = centre + random_vector(random, size);
-    soup[i].primitive = first_primitive + static_cast<uint32_t>(i);
-  }
-  return soup;
-}
-
-/// A closed, connected mesh: a bumpy sphere of 2 * rows * columns triangles or so, vertices shared to the bit.
-inline std::vector<TestTriangle> closed_mesh(uint32_t rows, uint32_t columns, float bumps, uint32_t first_primitive = 0) {
-  const auto vertex = [&](uint32_t r, uint32_t c) {
-    c %= columns;
-    if (r == 0 || r == rows) c = 0;
-    const double theta = 3.14159265358979 * r / rows, phi = 2 * 3.14159265358979 * c / columns;
-    const double radius = 1 + bumps * std::sin(5 * theta) * std::cos(7 * phi);
-    return Vec3(radius * std::sin(theta) * std::cos(phi), radius * std::cos(theta), radius * std::sin(theta) * std::sin(phi));
-  };
-  std::vector<TestTriangle> mesh;
-  for (uint32_t r = 0; r < rows; ++r) {
-    for (uint32_t c = 0; c < columns; ++c) {
-      const Vec3 a = vertex(r, c), b = vertex(r, c + 1), d = vertex(r + 1, c), e = vertex(r + 1, c + 1);
-      if (r != 0) mesh.push_back({{a, b, d}, 0});
-      if (r + 1 != rows) mesh.push_back({{b, e, d}, 0});
-    }
-  }
-  for (size_t i = 0; i < mesh.size(); ++i) mesh[i].primitive = first_primitive + static_cast<uint32_t>(i);
-  return mesh;
 }
 
 inline Ray make_ray(const Vec3& origin, const Vec3& direction, float t = kRayInfinity, bool any_hit = false) {

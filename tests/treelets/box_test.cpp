@@ -49,7 +49,8 @@ TEST(BoxTest, ARayThroughAPointOfTheBoxEntersIt) {
                               : Vec3(random() % 2, random() % 2, random() % 2);  // corners
     Vec3 target;
     for (int axis = 0; axis < 3; ++axis) {
-      target[axis] = std::clamp(box.lo[axis] + weight[axis] * (box.hi[axis] - box.lo[axis]), box.lo[axis], box.hi[axis]);
+      target[axis] =
+          std::clamp(box.lo[axis] + weight[axis] * (box.hi[axis] - box.lo[axis]), box.lo[axis], box.hi[axis]);
     }
     // The direction is rounded by u R: within the pad at t = 1.
     const Vec3 origin = random_vector(random, i % 5 ? 2.0f : 1000.0f);
@@ -84,7 +85,8 @@ TEST(BoxTest, MakesNoNanFromZeroHugeOrSubnormalNumbers) {
 }
 
 TEST(BoxTest, PowersOfTwoAreExact) {
-  for (int e = kMinGridPower; e <= 127; ++e) EXPECT_EQ(power_of_two(static_cast<int8_t>(e)), std::ldexp(1.0f, e)) << e;
+  for (int e = kMinGridPower; e <= 127; ++e)
+    EXPECT_EQ(power_of_two(static_cast<int8_t>(e)), std::ldexp(1.0f, e)) << e;
 }
 
 TEST(BoxTest, EntryKeysOrderByTimeThenSlot) {

@@ -86,7 +86,9 @@ TEST(CheckTreelet, RejectsFieldsThatDoNotFit) {
   rejects("ordinal", [](H&, N*, B* leaf, B*) { reinterpret_cast<LeafHeader*>(leaf)->first_ordinal = 0xffffffffu; });
   rejects("position", [](H&, N*, B* leaf, B*) { reinterpret_cast<float*>(leaf)[2] = INFINITY; });
   rejects("record index", [](H&, N*, B*, B* coverage) { reinterpret_cast<uint32_t*>(coverage)[0] = 2; });
-  const auto record = [](H& h, B* coverage) { return reinterpret_cast<CoverageRecord*>(coverage + 4 * h.triangle_count); };
+  const auto record = [](H& h, B* coverage) {
+    return reinterpret_cast<CoverageRecord*>(coverage + 4 * h.triangle_count);
+  };
   rejects("crop", [&](H& h, N*, B*, B* c) { record(h, c)->crop_width = 5; });
   rejects("huge crop", [&](H& h, N*, B*, B* c) { record(h, c)->crop_width = record(h, c)->crop_height = 65536; });
   rejects("texel offset", [&](H& h, N*, B*, B* c) { record(h, c)->texel_offset = 0xffffffffu; });
@@ -136,7 +138,8 @@ TEST(CheckTreelet, WhatPassesMayBeTracedAndFound) {
   for (int i = 0; i < 20000; ++i) {
     AlignedPage page(good);
     const std::span<std::byte> bytes = page.mutable_bytes();
-    for (uint32_t k = random() % 4 + 1; k > 0; --k) bytes[random() % bytes.size()] = static_cast<std::byte>(random());
+    for (uint32_t k = random() % 4 + 1; k > 0; --k)
+      bytes[random() % bytes.size()] = static_cast<std::byte>(random());
     if (!check_treelet(page.bytes()).ok()) continue;
     const TreeletEntry entry{0, random() % 2 ? root : kLeafBit | static_cast<uint32_t>(random() % 64)};
     if (!check_root(page.bytes(), entry.root).ok()) continue;
@@ -168,7 +171,8 @@ std::vector<std::byte> attribute_page(uint8_t index_bytes) {
   const uint32_t materials[2] = {7, 9};
   std::memcpy(page.data() + h.materials_offset, materials, 8);
   const uint32_t indices[6] = {0, 1, 2, 2, 1, 3};
-  for (int i = 0; i < 6; ++i) std::memcpy(page.data() + h.indices_offset + i * index_bytes, &indices[i], index_bytes);
+  for (int i = 0; i < 6; ++i)
+    std::memcpy(page.data() + h.indices_offset + i * index_bytes, &indices[i], index_bytes);
   for (int i = 0; i < 60; ++i) {
     const float value = static_cast<float>(i);
     std::memcpy(page.data() + h.vertices_offset + 4 * i, &value, 4);

@@ -59,14 +59,16 @@ TEST(Coverage, WholeLevelsWrapAsTheSamplerSays) {
     record.wrap_u = static_cast<uint8_t>(mode);
     std::vector<int> alphas;
     for (int x = -5; x < 9; ++x) {
-      alphas.push_back(static_cast<int>(std::lround(255 * alpha_at(record, texels, static_cast<float>(x) + 0.5f, 0.5f))));
+      alphas.push_back(
+          static_cast<int>(std::lround(255 * alpha_at(record, texels, static_cast<float>(x) + 0.5f, 0.5f))));
     }
     return alphas;
   };
   EXPECT_EQ(row(WrapMode::kRepeat), (std::vector<int>{255, 0, 51, 102, 255, 0, 51, 102, 255, 0, 51, 102, 255, 0}));
   EXPECT_EQ(row(WrapMode::kMirroredRepeat),
             (std::vector<int>{255, 255, 102, 51, 0, 0, 51, 102, 255, 255, 102, 51, 0, 0}));
-  EXPECT_EQ(row(WrapMode::kClampToEdge), (std::vector<int>{0, 0, 0, 0, 0, 0, 51, 102, 255, 255, 255, 255, 255, 255}));
+  EXPECT_EQ(row(WrapMode::kClampToEdge),
+            (std::vector<int>{0, 0, 0, 0, 0, 0, 51, 102, 255, 255, 255, 255, 255, 255}));
   EXPECT_GE(alpha_at(record, texels, 1e12f, -1e12f), 0) << "far outside";
 }
 
@@ -95,7 +97,8 @@ TEST(Coverage, BlendKeepsTheShareThatAlphaSays) {
       int kept = 0;
       constexpr int kCount = 20000;
       for (uint32_t i = 0; i < kCount; ++i) {
-        kept += is_covered(record, nullptr, {1, 0, 0}, varied == 0 ? i : 5, varied == 1 ? i : 6, varied == 2 ? i : 7);
+        kept +=
+            is_covered(record, nullptr, {1, 0, 0}, varied == 0 ? i : 5, varied == 1 ? i : 6, varied == 2 ? i : 7);
       }
       EXPECT_NEAR(kept / double{kCount}, alpha, 4 * std::sqrt(alpha * (1 - alpha) / kCount)) << varied;
     }
@@ -133,7 +136,8 @@ TEST(Coverage, TracesAsBruteForceWhateverTheOrderOfTriangles) {
       TriangleHit hit;
       if (!intersect_triangle(space, t.p[0], t.p[1], t.p[2], expected.t, hit)) continue;
       const uint32_t record = which(t.primitive);
-      if (record != kNoIndex && !is_covered(records[record], texels.data(), hit, start.alpha_seed, 0, t.primitive)) {
+      if (record != kNoIndex &&
+          !is_covered(records[record], texels.data(), hit, start.alpha_seed, 0, t.primitive)) {
         ++skipped;
         continue;
       }

@@ -14,7 +14,8 @@ TestScene instanced_scene(std::mt19937& random, size_t treelet_triangles = 10) {
   for (int i = 0; i < 40; ++i) {
     Placement p;
     p.object = random() % 2;
-    p.object_to_world = {random_vector(random), random_vector(random), random_vector(random), random_vector(random, 3)};
+    p.object_to_world = {random_vector(random), random_vector(random), random_vector(random),
+                         random_vector(random, 3)};
     placements.push_back(p);
   }
   return make_scene({a, b}, placements, {treelet_triangles, 4});
@@ -90,7 +91,8 @@ TEST(TopTree, EntersEntriesFrontToBack) {
     uint64_t tests = 0;
     std::vector<float> found;
     for (uint32_t entry; (entry = tree.next(ray, tests)) != kNoIndex;) {
-      const TreeletTriangle t = find_triangle(scene.pages[tree.entry(entry).treelet].bytes(), leaf_offset(tree.entry(entry).root) << 4);
+      const TreeletTriangle t =
+          find_triangle(scene.pages[tree.entry(entry).treelet].bytes(), leaf_offset(tree.entry(entry).root) << 4);
       found.push_back(sign * t.p0.x);
     }
     EXPECT_EQ(found.size(), scene.entries.size());
@@ -133,7 +135,8 @@ TEST(TopTree, RejectsLinksThatDoNotFit) {
   rejects("root node out of range", [](TestScene& s) { s.instances[3].root_node = 1u << 30; });
   rejects("root node is the instances' root", [](TestScene& s) { s.instances[3].root_node = 0; });
   rejects("root node is an inner node", [&](TestScene& s) { s.instances[3].root_node = root + 1; });
-  rejects("tree child of another instance", [](TestScene& s) { s.instances[3].tree_child = s.instances[4].tree_child; });
+  rejects("tree child of another instance",
+          [](TestScene& s) { s.instances[3].tree_child = s.instances[4].tree_child; });
   rejects("tree child out of range", [](TestScene& s) { s.instances[3].tree_child = 0xfffffff0u; });
   rejects("a matrix that is not finite", [](TestScene& s) { s.instances[3].world_to_object.translation.y = NAN; });
   rejects("entry of no treelet", [](TestScene& s) { s.entries[0].treelet = 1u << 20; });
@@ -162,8 +165,10 @@ TEST(TopTree, WhatPassesTheCheckIsWalkedToAnEndWhateverItsNumbers) {
       std::memcpy(static_cast<char*>(at) + place, &word, 4);
     };
     for (uint32_t k = random() % 3 + 1; k > 0; --k) {
-      if (random() % 4 == 0) damage(bad.instances.data(), bad.instances.size() * sizeof(Instance));
-      else damage(bad.nodes.data(), bad.nodes.size() * sizeof(TopNode));
+      if (random() % 4 == 0)
+        damage(bad.instances.data(), bad.instances.size() * sizeof(Instance));
+      else
+        damage(bad.nodes.data(), bad.nodes.size() * sizeof(TopNode));
     }
     if (!check(bad).ok()) continue;
     ++passed;

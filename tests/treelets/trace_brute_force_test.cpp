@@ -1,4 +1,5 @@
-// The heart of the floor: traversal through top tree and treelets gives, bit for bit, what testing every triangle gives.
+// The heart of the floor: traversal through top tree and treelets gives, bit for bit, what testing every triangle
+// gives.
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
@@ -65,7 +66,8 @@ void expect_same(const Ray& expected, const Ray& found, size_t index) {
 
 /// Scene by scene, ray by ray, for the product's kernel and the scalar reference. Returns the number of hits.
 size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t more_levels = 32) {
-  EXPECT_TRUE(TopTree::check(scene.nodes, scene.entries, scene.instances, static_cast<uint32_t>(scene.pages.size())).ok());
+  EXPECT_TRUE(
+      TopTree::check(scene.nodes, scene.entries, scene.instances, static_cast<uint32_t>(scene.pages.size())).ok());
   const TopTree tree(scene.nodes, scene.entries, scene.instances, {more_levels});
   for (const AlignedPage& page : scene.pages) EXPECT_TRUE(check_treelet(page.bytes()).ok());
   size_t hits = 0;
@@ -146,16 +148,18 @@ TEST(Trace, FindsWhatBruteForceFindsAmongInstances) {
 }
 
 TEST(Trace, FindsHitsOnTheVeryFacesOfInstances) {
-  // Flat objects whose world boxes are flat too, met in their planes, on their corners and from afar: what the object
-  // space accepts, the boxes of the world must not lose.
+  // Flat objects whose world boxes are flat too, met in their planes, on their corners and from afar: what the
+  // object space accepts, the boxes of the world must not lose.
   std::mt19937 random(7);
-  const std::vector<TestTriangle> square{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 0}, {{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, 1}};
+  const std::vector<TestTriangle> square{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 0},
+                                         {{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, 1}};
   std::vector<Placement> placements;
   for (int i = 0; i < 60; ++i) {
     Placement p;
     const float scale = i % 3 == 0 ? 0.001f : 1.7f;
     const int axis = i % 3;
-    p.object_to_world.column_x = Vec3(0), p.object_to_world.column_y = Vec3(0), p.object_to_world.column_z = Vec3(0);
+    p.object_to_world.column_x = Vec3(0), p.object_to_world.column_y = Vec3(0),
+    p.object_to_world.column_z = Vec3(0);
     p.object_to_world.column_x[axis] = scale;
     p.object_to_world.column_y[(axis + 1) % 3] = -scale;
     p.object_to_world.column_z[(axis + 2) % 3] = 0.3f;

@@ -15,7 +15,8 @@ struct DoubleHit {
 using Double3 = glm::dvec3;
 
 DoubleHit intersect_double(const Vec3& origin, const Vec3& direction, const TestTriangle& triangle) {
-  const Double3 o(origin), d(direction), a(triangle.p[0]), e1 = Double3(triangle.p[1]) - a, e2 = Double3(triangle.p[2]) - a;
+  const Double3 o(origin), d(direction), a(triangle.p[0]), e1 = Double3(triangle.p[1]) - a,
+                                                           e2 = Double3(triangle.p[2]) - a;
   const Double3 p = glm::cross(d, e2), s = o - a, q = glm::cross(s, e1);
   const double det = glm::dot(e1, p);
   const double b1 = glm::dot(s, p) / det, b2 = glm::dot(d, q) / det;
