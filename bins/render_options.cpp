@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
 #include "treelets/build_object.h"
 
@@ -47,16 +48,23 @@ Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOp
   return path;
 }
 
-void choose_sky(const Scene& scene, const std::string& asked, PictureOptions& picture, Console& console) {
-  EnvironmentOptions& sky = picture.shading.environment;
-  const bool dark = scene.emitters.empty() && scene.lights.empty();
-  if (asked.empty() && dark) {
-    sky.kind = EnvironmentOptions::Kind::kConstant;
-    sky.radiance = Vec3(1);
-    console.warning("the scene has no light: lit by a constant sky of 1 (choose one with --environment)");
-  } else if (dark && sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)) {
-    console.warning("the scene has no light and the environment is black: the picture will be black");
+Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& console) {
+  if (!asked.empty()) {
+    const EnvironmentOptions& sky = prepared.picture.shading.environment;
+    if (prepared.scene.emitters.empty() && prepared.scene.lights.empty() &&
+        sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)) {
+      console.warning("the scene has no light and the environment is black: the picture will be black");
+    }
+    return {};
   }
+  SHOAL_ASSIGN_OR_RETURN(const UnlitChoice choice, light_unlit_scene(posix_file_system(), prepared.scene,
+                                                                     prepared.picture, prepared.execution));
+  if (choice == UnlitChoice::kSky) {
+    console.warning("the scene has no light: lit by a constant sky of 1 (choose one with --environment)");
+  } else if (choice == UnlitChoice::kSkyAndLamp) {
+    console.warning("the scene has no light and its geometry closes off the sky: lit by a lamp at the camera as well");
+  }
+  return {};
 }
 
 Result<uint64_t> size_or_zero(const std::string& text) {
@@ -167,7 +175,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console&
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, open_scene(posix_file_system(), path, mode, {arguments.more_levels}));
-  choose_sky(prepared.scene, arguments.environment, prepared.picture, console);
+  SHOAL_RETURN_IF_ERROR(choose_sky(arguments.environment, prepared, console));
   return prepared;
 }
 
