@@ -59,7 +59,7 @@ class DemoScene {
     add_fish();
     add_reef();
     add_still_life();
-    add_camera(*document_, "reef", Vec3(0.2f, 1.75f, 10.6f), Vec3(0.1f, 2.35f, 0), 0.74);
+    add_camera(*document_, "reef", Vec3(0.2f, 1.75f, 10.6f), Vec3(0.1f, 2.2f, 0), 0.74);
     add_unique();
     report_->triangles_count += triangles_;
     return writer_->status();
@@ -103,7 +103,7 @@ class DemoScene {
     marble.base_color_texture = textured("marble.png");
     m.marble = material(marble);
     m.pearl = material(rough_material("pearl", {0.90f, 0.84f, 0.80f}, 0.18));
-    m.orb = material(emissive_material("orb", {15, 5.2f, 1.6f}));
+    m.orb = material(emissive_material("orb", {3.4f, 0.95f, 0.16f}));
     m.star = material(rough_material("starfish", {0.86f, 0.20f, 0.06f}, 0.55));
     gltf::Material sea = emissive_material("open sea", Vec3(1.25f));
     sea.emissive_texture = textured("sea.png", true);
@@ -162,7 +162,7 @@ class DemoScene {
 
   void add_light() {
     const Vec3 sun(-0.40f, -0.82f, -0.42f);
-    show("open sea", sea_dome(42, -sun, 0.88f), materials_.sea);
+    show("open sea", sea_dome(42, -sun, 0.925f), materials_.sea);
     add_sun(*document_, sun, {1.0f, 0.93f, 0.80f}, kSunLux);
     // The sheet lies across the sun's way, in the gap of the dome; many cells, so that its alpha is kept in full
     // (treelets/coverage.h).
@@ -236,7 +236,7 @@ void DemoScene::add_fish() {
                facing(place, heading, Vec3(0, 1, 0) + random.unit_vector() * 0.08f, size));
   }
   show_again(meshes[kStrokes], fish_triangles,
-             facing(Vec3(-2.1f, 2.45f, 5.3f), Vec3(-1, 0.03f, 0.35f), Vec3(0, 1, 0), 1.15f));
+             facing(Vec3(-0.45f, 1.95f, 4.7f), Vec3(-1, 0.03f, 0.3f), Vec3(0, 1, 0), 1.15f));
 }
 
 void DemoScene::add_reef() {
@@ -296,12 +296,12 @@ void DemoScene::add_still_life() {
     uint32_t material;
   };
   const DemoMaterials& m = materials_;
-  const Ball balls[] = {{1.75f, 4.15f, 0.62f, 0.12f, m.silver}, {0.55f, 5.25f, 0.34f, 0.06f, m.gold},
-                        {2.72f, 5.2f, 0.30f, 0.05f, m.copper},  {-0.85f, 4.1f, 0.46f, 0.10f, m.marble},
-                        {0.1f, 6.3f, 0.13f, 0.02f, m.pearl},    {1.42f, 5.9f, 0.17f, 0.03f, m.pearl},
-                        {-1.42f, 5.3f, 0.20f, 0.03f, m.pearl},  {3.25f, 4.3f, 0.22f, 0.03f, m.gold},
-                        {-3.1f, 5.0f, 0.15f, 0.03f, m.orb},     {-3.8f, 4.6f, 0.11f, 0.02f, m.orb},
-                        {3.9f, 5.0f, 0.14f, 0.03f, m.orb},      {-2.2f, -2.4f, 0.2f, 0.03f, m.orb},
+  const Ball balls[] = {{1.75f, 3.7f, 0.62f, 0.12f, m.silver}, {0.55f, 4.75f, 0.34f, 0.06f, m.gold},
+                        {2.75f, 4.6f, 0.30f, 0.05f, m.copper}, {-0.85f, 3.7f, 0.46f, 0.10f, m.marble},
+                        {-0.1f, 5.35f, 0.13f, 0.02f, m.pearl}, {1.45f, 5.25f, 0.16f, 0.03f, m.pearl},
+                        {-1.5f, 4.75f, 0.20f, 0.03f, m.pearl}, {3.3f, 3.9f, 0.22f, 0.03f, m.gold},
+                        {-2.75f, 4.3f, 0.13f, 0.03f, m.orb},   {-2.45f, 4.75f, 0.09f, 0.02f, m.orb},
+                        {3.75f, 4.55f, 0.12f, 0.03f, m.orb},   {-2.2f, -2.4f, 0.2f, 0.03f, m.orb},
                         {4.4f, -1.6f, 0.2f, 0.03f, m.orb}};
   const MeshData sphere = unit_sphere(fine ? 28 : 8), star = starfish(fine ? 14 : 4);
   std::map<uint32_t, uint32_t> meshes;  // by material
@@ -318,8 +318,8 @@ void DemoScene::add_still_life() {
   const auto lay = [&](float x, float z, float size, float turn) {
     show_again(star_mesh, star.triangles_count(), turned(Vec3(x, floor_at(x, z) + 0.02f, z), turn, Vec3(size)));
   };
-  lay(-1.9f, 6.3f, 0.42f, 0.4f);
-  lay(3.3f, 6.0f, 0.30f, 1.1f);
+  lay(-0.75f, 5.6f, 0.36f, 0.4f);
+  lay(2.5f, 5.55f, 0.30f, 1.1f);
 }
 
 struct DemoRock {

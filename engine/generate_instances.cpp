@@ -69,16 +69,16 @@ Result<std::vector<Model>> write_models(const GenerateContext& context, GltfWrit
   const auto seed = static_cast<uint32_t>(context.options.seed);
   add("broadleaf tree", broadleaf_tree(budget(2.4), seed), leaves, 1.3f, 0.14);
   add("conifer", conifer_tree(budget(2.0), seed + 1), leaves, 1.35f, 0.16);
-  add("bush", card_bush(budget(0.9), seed + 2), cards, 1.2f, 0.15);
-  add("fern", fern(budget(0.5), seed + 3), frond, 1.2f, 0.15);
-  add("grass", grass_tuft(budget(0.35), seed + 4), leaves, 1.4f, 0.3);
+  add("bush", card_bush(budget(0.9), seed + 2), cards, 1.2f, 0.14);
+  add("fern", fern(budget(0.5), seed + 3), frond, 1.2f, 0.14);
+  add("grass", grass_tuft(budget(0.35), seed + 4), leaves, 1.4f, 0.34);
   gltf::Mesh rock;
   rock.name = "rock";
   SurfaceWriter surfaces(writer);
   const uint32_t cells = sphere_cells(0.5 * triangles_each);
   surfaces.add_sphere(rock, cells, rock_surface({Vec3(0, 0.2f, 0), Vec3(0.6f, 0.45f, 0.6f), 0, 0.6f, seed}, cells),
                       stone);
-  models.push_back({add_mesh(document, std::move(rock)), surfaces.triangles_count(), 1.5f, 0.1});
+  models.push_back({add_mesh(document, std::move(rock)), surfaces.triangles_count(), 1.5f, 0.08});
   return models;
 }
 
@@ -109,7 +109,7 @@ uint64_t strew(const GenerateContext& context, gltf::Document& document, const s
     const double z = 6 - (depth + 6) * along, x = (across - 0.5) * (depth * 0.5 + 12 + depth * along * 0.7);
     const bool tall = model == &models[0] || model == &models[1];
     const double off_trail = std::abs(x - trail_x(z, seed));
-    if (off_trail < (tall ? 3.2 : 1.0) || (tall && z > -4)) continue;
+    if (off_trail < (tall ? 3.2 : 0.7) || (tall && z > -4)) continue;
     const float scale = model->largest_scale * random.uniform(0.55f, 1.0f);
     const Vec3 stretch(scale * random.uniform(0.85f, 1.15f), scale * random.uniform(0.85f, 1.2f), scale);
     const bool mirrored = random.below(3) == 0;

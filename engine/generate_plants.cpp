@@ -65,8 +65,8 @@ Plant broadleaf_tree(uint64_t triangles, uint32_t seed) {
   }
   const uint64_t wood = plant.wood.triangles_count();
   const uint64_t leaves = triangles > wood ? (triangles - wood) / 2 : 2;
-  // The leaves' area stays the same, 60 square metres, until they reach 3 cm.
-  const float size = std::max(0.03f, std::sqrt(60.0f / static_cast<float>(leaves)) * 0.55f);
+  // The leaves' area stays about the same until they reach 3 cm.
+  const float size = std::max(0.03f, std::sqrt(52.0f / static_cast<float>(leaves)));
   for (uint64_t k = 0; k < leaves; ++k) {
     const Vec3 out = random.unit_vector();
     const float radius = 1 - random.uniform() * random.uniform();
@@ -87,7 +87,7 @@ Plant conifer_tree(uint64_t triangles, uint32_t seed) {
                     tapering(0.2f, 0.02f, segments), sides);
   const uint64_t wood = plant.wood.triangles_count();
   const uint64_t needles = triangles > wood ? (triangles - wood) / 2 : 2;
-  const float size = std::max(0.05f, std::sqrt(34.0f / static_cast<float>(needles)) * 0.9f);
+  const float size = std::max(0.05f, std::sqrt(56.0f / static_cast<float>(needles)));
   const uint32_t whorls = 22;
   for (uint64_t k = 0; k < needles; ++k) {
     const float whorl = static_cast<float>(random.below(whorls)) / static_cast<float>(whorls);

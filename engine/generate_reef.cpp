@@ -146,7 +146,7 @@ MeshData kelp(uint32_t ribbons, float height, uint32_t seed) {
 }
 
 MeshData sea_dome(float radius, const Vec3& gap, float gap_cosine) {
-  constexpr uint32_t kAround = 48, kUp = 20;
+  constexpr uint32_t kAround = 72, kUp = 30;
   const Vec3 towards = glm::normalize(gap);
   MeshData mesh;
   std::vector<bool> open;

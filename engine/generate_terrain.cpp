@@ -13,7 +13,7 @@ namespace shoal {
 namespace {
 
 // A cave along -z, in metres: a ground, an arch that makes walls and ceiling, and closed ends.
-constexpr double kNear = 16, kFar = -118;
+constexpr double kNear = 16, kFar = -84;
 constexpr double kLength = kNear - kFar;
 constexpr double kArchOverlap = 0.35;  // radians by which the arch goes below the horizon, under the ground
 
@@ -63,14 +63,14 @@ struct TerrainMaterials {
 
 TerrainMaterials add_materials(gltf::Document& document) {
   TerrainMaterials m;
-  m.ground = add_material(document, rough_material("ground", {0.46f, 0.36f, 0.27f}));
-  m.arch = add_material(document, rough_material("arch", {0.50f, 0.46f, 0.44f}));
+  m.ground = add_material(document, rough_material("ground", {0.50f, 0.37f, 0.25f}));
+  m.arch = add_material(document, rough_material("arch", {0.44f, 0.45f, 0.48f}));
   m.rock[0] = add_material(document, rough_material("rock grey", {0.38f, 0.38f, 0.40f}, 0.8));
   m.rock[1] = add_material(document, rough_material("rock red", {0.52f, 0.29f, 0.19f}, 0.9));
   m.rock[2] = add_material(document, metal_material("ore", {0.72f, 0.56f, 0.38f}, 0.35));
   m.lime = add_material(document, rough_material("limestone", {0.74f, 0.68f, 0.58f}, 0.45));
-  m.panel = add_material(document, emissive_material("panel", {13, 14.5f, 17}));
-  m.lantern = add_material(document, emissive_material("lantern", {42, 19, 6}));
+  m.panel = add_material(document, emissive_material("panel", {4.0f, 4.6f, 5.4f}));
+  m.lantern = add_material(document, emissive_material("lantern", {9, 3.4f, 0.8f}));
   return m;
 }
 
@@ -85,7 +85,7 @@ std::vector<PlacedRock> place_rocks(const Cave& cave, const TerrainMaterials& ma
   RandomStream random(seed, 1);
   std::vector<PlacedRock> rocks;
   while (rocks.size() < count) {
-    const double z = random.uniform(static_cast<float>(kFar + 8), static_cast<float>(kNear - 6));
+    const double z = random.uniform(static_cast<float>(kFar + 8), static_cast<float>(kNear - 13));
     float u = random.uniform(-1, 1);
     u = u < 0 ? -std::sqrt(-u) : std::sqrt(u);  // more at the sides
     const double reach = cave.half_width(z) * cave.taper(z) * 0.95;
@@ -95,18 +95,18 @@ std::vector<PlacedRock> place_rocks(const Cave& cave, const TerrainMaterials& ma
     const uint32_t pick = random.below(8);
     const auto rock_seed = random.bits();
     const bool in_the_way = std::abs(u) * reach < 2.2 + size;
-    if (in_the_way && kind < 0.8f) continue;
+    if (in_the_way && kind < 0.86f) continue;
     PlacedRock placed;
     placed.rock = Rock{Vec3(x, cave.ground(x, z) + 0.15f * size, z), Vec3(size), 0, 0.5f, rock_seed};
     placed.material = materials.rock[pick < 4 ? 0 : pick < 7 ? 1 : 2];
-    if (kind > 0.62f) {  // stalagmites and, hanging, stalactites
-      const bool hanging = kind > 0.8f;
-      const float tall = (1.5f + 3.5f * random.uniform()) * (hanging ? 0.8f : 1);
+    if (kind > 0.72f) {  // stalagmites and, hanging, stalactites
+      const bool hanging = kind > 0.86f;
+      const float tall = (1.0f + 2.6f * random.uniform()) * (hanging ? 0.8f : 1);
       const double arch = cave.height(z) * cave.taper(z) * std::sqrt(std::max(0.0, 1 - double{u} * u));
       placed.rock.center.y = hanging ? static_cast<float>(arch - 1) : placed.rock.center.y + 0.4f * tall;
-      placed.rock.radii = Vec3(0.35f + 0.2f * size, tall, 0.35f + 0.2f * size);
-      placed.rock.taper = hanging ? -0.85f : 0.85f;
-      placed.rock.roughness = 0.25f;
+      placed.rock.radii = Vec3(0.55f + 0.4f * size, tall, 0.55f + 0.4f * size);
+      placed.rock.taper = hanging ? -0.8f : 0.8f;
+      placed.rock.roughness = 0.7f;
       placed.material = materials.lime;
     }
     const Vec3& r = placed.rock.radii;
@@ -122,13 +122,13 @@ uint64_t add_lights(GltfWriter& writer, const Cave& cave, const TerrainMaterials
   MeshData panels, lanterns;
   const MeshData ball = unit_sphere(lantern_cells);
   int side = 1;
-  for (double z = 5; z > kFar + 10; z -= 12, side = -side) {
+  for (double z = 2; z > kFar + 10; z -= 17, side = -side) {
     const double roof = cave.height(z) * 0.62;
     const Vec3 center(cave.center(z) + side * 2.5, roof, z);
-    panels.append(rectangle(center, Vec3(2.6f, 0.25f * side, 0), Vec3(0, 0, 0.9f)));
-    const double lantern_z = z - 6, x = cave.center(lantern_z) - side * 3.4;
+    panels.append(rectangle(center, Vec3(3.4f, 0.3f * side, 0), Vec3(0, 0, 2.6f)));
+    const double lantern_z = z - 8, x = cave.center(lantern_z) - side * 4.2;
     MeshData lantern = ball;
-    for (Vec3& p : lantern.positions) p = p * 0.28f + Vec3(x, cave.ground(x, lantern_z) + 0.55, lantern_z);
+    for (Vec3& p : lantern.positions) p = p * 0.5f + Vec3(x, cave.ground(x, lantern_z) + 0.8, lantern_z);
     lanterns.append(lantern);
   }
   for (MeshData* mesh : {&panels, &lanterns}) mesh->normals.clear(), mesh->uvs.clear();
@@ -150,8 +150,8 @@ void add_view(gltf::Document& document, const Cave& cave) {
 Status generate_terrain(const GenerateContext& context, GltfWriter& writer, GenerateReport& report) {
   const uint64_t triangles = context.options.triangles;
   const auto seed = static_cast<uint32_t>(context.options.seed ^ (context.options.seed >> 32));
-  // The ground and the arch have about 2800 and 5600 square metres; cells are 2 triangles.
-  const double cell = std::sqrt(8400.0 / (0.35 * static_cast<double>(triangles)));
+  // The ground and the arch have about 2200 and 4200 square metres; cells are 2 triangles.
+  const double cell = std::sqrt(6400.0 / (0.35 * static_cast<double>(triangles)));
   const Cave cave(seed, cell);
   gltf::Document& document = writer.document();
   const TerrainMaterials materials = add_materials(document);

@@ -76,7 +76,7 @@ Vec4 paint_frond(float u, float v) {
     best = std::max(best, 0.8f * inside_leaf(px * 0.9f + py * 0.436f, py * 0.9f - px * 0.436f, reach, 0.035f));
   }
   const float alpha = glm::clamp(best * 2.2f, 0.0f, 1.0f);
-  return Vec4(0.33f, 0.56f + 0.1f * y, 0.2f, alpha);
+  return Vec4(0.30f, 0.44f + 0.1f * y, 0.16f, alpha);
 }
 
 Vec4 paint_sea_fan(float u, float v, uint32_t seed) {
@@ -115,9 +115,9 @@ Vec4 paint_sea(float u, float v) {
   // v = 0.89 is the horizon of sea_dome, which goes to 101 degrees from the zenith.
   const float x = (u - 0.49f) / 0.11f, y = (v - 0.86f) / 0.16f;
   const float glow = 1 / (1 + 1.6f * (x * x + y * y));
-  const Vec3 deep(0.04f, 0.22f, 0.36f), shallow(0.55f, 0.80f, 0.88f), light(0.86f, 1.0f, 0.97f);
-  Vec3 color = glm::mix(shallow, deep, static_cast<float>(smooth_step(0.05, 0.95, v)));
-  color = glm::mix(color, light, 0.95f * glow * std::sqrt(glow));
+  const Vec3 deep(0.04f, 0.22f, 0.37f), shallow(0.52f, 0.80f, 0.88f), light(0.66f, 0.97f, 0.95f);
+  Vec3 color = glm::mix(shallow, deep, static_cast<float>(smooth_step(0.25, 0.92, v)));
+  color = glm::mix(color, light, 0.95f * glow);
   return Vec4(color, 1);
 }
 
