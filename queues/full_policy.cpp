@@ -2,12 +2,15 @@
 // come is flushed fullest first.
 #include "queues/drain_policy.h"
 
+#include <algorithm>
+
 namespace shoal {
 namespace {
 
 class FullPolicy final : public DrainPolicy {
  public:
-  explicit FullPolicy(uint32_t queue_capacity) : queue_capacity_(queue_capacity) {}
+  /// At least 1: an empty queue must never count as full, or it would be chosen for ever.
+  explicit FullPolicy(uint32_t queue_capacity) : queue_capacity_(std::max(queue_capacity, 1u)) {}
 
   TreeletId choose(const WaitingView& view, bool more_coming) override {
     TreeletId best = kNoIndex;

@@ -58,5 +58,11 @@ TEST(DrainPolicy, FullWaitsForCapacityWhileRaysAreComing) {
   EXPECT_EQ(policy->choose(FixedView({20, 0, 50}), false), 2u);
 }
 
+TEST(DrainPolicy, FullNeverChoosesAnEmptyQueueWhateverItsCapacity) {
+  const auto policy = make_full_policy(0);
+  EXPECT_EQ(policy->choose(FixedView({0, 0, 1}), true), 2u);
+  EXPECT_EQ(policy->choose(FixedView({0, 0, 0}), true), kNoIndex);
+}
+
 }  // namespace
 }  // namespace shoal
