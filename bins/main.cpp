@@ -4,6 +4,7 @@
 #include <map>
 #include <new>
 
+#include "bins/choice_option.h"
 #include "bins/command.h"
 #include "engine/render_report.h"
 
@@ -19,12 +20,8 @@ void declare_console(CLI::App& app, shoal::Console& console, bool& quiet) {
                                                                  {"lines", shoal::ProgressMode::kLines},
                                                                  {"json", shoal::ProgressMode::kJson},
                                                                  {"none", shoal::ProgressMode::kNone}};
-  app.add_option("--log-level", console.level, "error, warning, info, debug")
-      ->transform(CLI::CheckedTransformer(kLevels))
-      ->type_name("LEVEL");
-  app.add_option("--progress", console.progress, "auto, bar, lines, json, none")
-      ->transform(CLI::CheckedTransformer(kModes))
-      ->type_name("MODE");
+  shoal::add_choice(app, "--log-level", console.level, kLevels)->type_name("LEVEL");
+  shoal::add_choice(app, "--progress", console.progress, kModes)->type_name("MODE");
   app.add_flag("--quiet", quiet, "errors only");
 }
 

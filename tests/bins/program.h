@@ -1,0 +1,70 @@
+// Runs the program under test as its users do: a process of its own, with its output and exit code. Used by
+// tests/bins. Every run has a deadline, so that a hang is a failure and not a stuck test. HOME and the cache folder
+// are the temporary folder's, so that no test reads or leaves anything outside it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace shoal::testing {
+
+/// A folder of its own under the system's temporary one, removed with all it holds.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  std::string path() const { return path_.string(); }
+  /// Names of what lies in it, hidden files too, sorted; of a folder in it when `inside` names one.
+  std::vector<std::string> names(const std::string& inside = "") const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct ProgramRun {
+  int exit_code = -1;  ///< -1: it did not exit by itself
+  int signal = 0;      ///< that ended it, when one did
+  bool timed_out = false;
+  std::string out, err;
+};
+
+/// A running program; the destructor kills and reaps what still runs.
+class Program {
+ public:
+  /// Starts `command` (the first word is the file). Its output goes to hidden files of `folder`.
+  Program(const TemporaryFolder& folder, const std::vector<std::string>& command);
+  ~Program();
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  void send(int signal) const;
+  /// What it has written to stderr by now.
+  std::string err() const;
+  bool running();
+  /// Waits for the end, kills it after `deadline`.
+  ProgramRun wait(std::chrono::seconds deadline = std::chrono::seconds(120));
+
+ private:
+  std::string out_path_, err_path_;
+  pid_t pid_ = -1;
+  int status_ = 0;
+};
+
+/// `shoal` with these arguments, from start to end.
+ProgramRun run_shoal(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
+/// A shell command in which $SHOAL is the program, in the temporary folder: for limits that only a shell sets.
+ProgramRun run_shell(const TemporaryFolder& folder, const std::string& command);
+
+std::string file_text(const std::string& path);
+void put_file(const std::string& path, const std::string& text);
+
+}  // namespace shoal::testing
