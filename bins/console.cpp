@@ -24,19 +24,36 @@ std::string clock_text(double seconds) {
   return fmt::format("{:02}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
+/// Messages name files, whose names may be any bytes: what is not UTF-8 is replaced.
+void print_json(const nlohmann::ordered_json& line) {
+  fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
+
 }  // namespace
 
 void Console::log(LogLevel line_level, std::string_view prefix, std::string_view message) {
   if (line_level > level) return;
   std::lock_guard guard(mutex_);
   if (bar_open_) std::fputs("\n", stderr), bar_open_ = false;
+  if (progress == ProgressMode::kJson) {
+    static constexpr const char* kLevelNames[] = {"error", "warning", "info", "debug"};
+    print_json({{"level", kLevelNames[static_cast<size_t>(line_level)]},
+                {"message", message},
+                {"seconds", seconds_since_start()},
+                {"rss_bytes", resident_set_bytes()}});
+    return;
+  }
   fmt::print(stderr, "{} {:>6} MB | {}{}\n", clock_text(seconds_since_start()), resident_set_bytes() >> 20, prefix,
              message);
 }
 
 int Console::error(const Error& error) {
   end_progress();
-  fmt::print(stderr, "shoal: {}\n", error.message);
+  if (progress == ProgressMode::kJson) {
+    print_json({{"level", "error"}, {"message", error.message}, {"exit_code", static_cast<int>(error.code)}});
+  } else {
+    fmt::print(stderr, "shoal: {}\n", error.message);
+  }
   return static_cast<int>(error.code);
 }
 
@@ -57,13 +74,15 @@ void Console::show_progress(std::string_view stage, double fraction, double seco
   if (seconds - last_line_seconds_ < kSecondsBetweenLines && seconds >= last_line_seconds_) return;
   last_line_seconds_ = seconds;
   if (mode == ProgressMode::kJson) {
-    const nlohmann::ordered_json line{{"stage", stage},        {"fraction", fraction}, {"seconds", seconds},
-                                      {"seconds_left", left},  {"rss_bytes", resident_set_bytes()},
-                                      {"detail", detail}};
-    fmt::print(stderr, "{}\n", line.dump());
+    print_json({{"stage", stage},
+                {"fraction", fraction},
+                {"seconds", seconds},
+                {"seconds_left", left},
+                {"rss_bytes", resident_set_bytes()},
+                {"detail", detail}});
   } else {
-    fmt::print(stderr, "{} {:>6} MB | {} {:.1f} %, {} left, {}\n", clock_text(seconds_since_start()),
-               resident_set_bytes() >> 20, stage, fraction * 100, clock_text(left), detail);
+    fmt::print(stderr, "{} {:>6} MB | {} {:.1f} %, {} left{}{}\n", clock_text(seconds_since_start()),
+               resident_set_bytes() >> 20, stage, fraction * 100, clock_text(left), detail.empty() ? "" : ", ", detail);
   }
 }
 

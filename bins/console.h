@@ -1,5 +1,6 @@
 // What the program says: log lines with time and memory on stderr, a progress bar or lines, errors with their exit
-// code. Called by bins only: the library below neither prints nor exits.
+// code. With --progress json every line of stderr is one JSON object: progress has a "stage", all else a "level".
+// Called by bins only: the library below neither prints nor exits.
 #pragma once
 
 #include <cstdint>
