@@ -24,6 +24,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   if (!arguments.max_memory.empty()) {
     SHOAL_ASSIGN_OR_RETURN(options.max_memory_bytes, parse_size(arguments.max_memory));
   }
+  SHOAL_RETURN_IF_ERROR(check_output(arguments.output));
   options.progress = build_progress(console);
   return build_scene(posix_file_system(), arguments.scene, arguments.output, options);
 }

@@ -46,6 +46,15 @@ Result<std::vector<OrderResult>> render_orders(const Arguments& arguments, Prepa
   return results;
 }
 
+/// What can be said before the scene is read; makes the folder.
+Status check_arguments(const Arguments& arguments) {
+  for (const std::string& name : arguments.orders) SHOAL_RETURN_IF_ERROR(parse_order(name));
+  std::error_code code;
+  std::filesystem::create_directories(arguments.out, code);
+  if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", arguments.out, code.message())};
+  return check_output(arguments.out + "/compare.json");
+}
+
 bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
@@ -59,14 +68,12 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared,
     json["orders"][std::string(order_name(r.execution.order))] =
         nlohmann::ordered_json::parse(stats_json(r.result, prepared.scene, prepared.picture, r.execution));
   }
-  std::error_code code;
-  std::filesystem::create_directories(arguments.out, code);
-  if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", arguments.out, code.message())};
   const std::string text = json.dump(1) + "\n";
   return write_whole_file(posix_file_system(), arguments.out + "/compare.json", std::as_bytes(std::span(text)));
 }
 
 int run_compare(const Arguments& arguments, Console& console) {
+  if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   auto prepared = prepare_render(arguments.render, console);
   if (!prepared.ok()) return console.error(prepared.error());
   auto results = render_orders(arguments, prepared.value(), console);

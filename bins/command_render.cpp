@@ -1,9 +1,11 @@
 // shoal render: a picture of a scene.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <memory>
 
+#include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
@@ -17,6 +19,18 @@ struct Arguments {
   std::string output, png, stats, tonemap = "pbr-neutral";
   float exposure = 0;
 };
+
+/// What can be said before the scene is read.
+Status check_arguments(const Arguments& arguments) {
+  if (const auto curve = parse_tone_curve(arguments.tonemap); !curve.ok()) return curve.error();
+  if (!std::isfinite(arguments.exposure)) {
+    return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
+  }
+  for (const std::string& path : {arguments.output, arguments.png, arguments.stats}) {
+    if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
+  }
+  return {};
+}
 
 Status write_preview(const Arguments& arguments, const ExrImage& image) {
   SHOAL_ASSIGN_OR_RETURN(const ToneCurve curve, parse_tone_curve(arguments.tonemap));
@@ -35,7 +49,7 @@ Status write_outputs(const Arguments& arguments, const PreparedRender& prepared,
 }
 
 int run_render(const Arguments& arguments, Console& console) {
-  if (const auto curve = parse_tone_curve(arguments.tonemap); !curve.ok()) return console.error(curve.error());
+  if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   auto prepared = prepare_render(arguments.render, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
@@ -69,8 +83,7 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--tonemap", arguments->tonemap, "of the preview: pbr-neutral, none")->capture_default_str();
   sub->add_option("--exposure", arguments->exposure, "of the preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
-  sub->add_option("--order", arguments->render.execution.order, "queued, depth-first (the picture is the same)")
-      ->transform(CLI::CheckedTransformer(kOrders))
+  add_choice(*sub, "--order", arguments->render.execution.order, kOrders, " (the picture is the same)")
       ->type_name("ORDER");
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_render(*arguments, console); };

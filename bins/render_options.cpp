@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <system_error>
 
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
@@ -123,6 +126,22 @@ Result<EnvironmentOptions> parse_environment(const std::string& text) {
     at = rest + 1;
   }
   return environment;
+}
+
+Status check_output(const std::string& path) {
+  std::error_code code;
+  const std::filesystem::file_status found = std::filesystem::status(path, code);
+  if (std::filesystem::exists(found) && !std::filesystem::is_regular_file(found)) {
+    return Error{ErrorCode::kStorage, fmt::format("{}: cannot be written: expected a file or nothing there, found {}", path,
+                                                  std::filesystem::is_directory(found) ? "a folder" : "a device")};
+  }
+  std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (folder.empty()) folder = ".";
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    return Error{ErrorCode::kStorage, fmt::format("{}: cannot be written: {}: {}", path, folder.string(),
+                                                  std::generic_category().message(errno))};
+  }
+  return {};
 }
 
 void RenderArguments::declare(CLI::App& app) {

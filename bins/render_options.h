@@ -22,6 +22,10 @@ Result<uint32_t> parse_treelet_size(const std::string& text);
 /// "constant:R,G,B", "F.hdr", "F.exr". Fails with: kUsage.
 Result<EnvironmentOptions> parse_environment(const std::string& text);
 
+/// Whether a file can be put at `path`: its folder is there and can be written, and what is there already is a file (the
+/// rename would take the place of a device or a pipe as well). Asked before long work. Fails with: kStorage.
+Status check_output(const std::string& path);
+
 /// Options as they stand on the command line.
 struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder;
