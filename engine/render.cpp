@@ -30,7 +30,8 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
                  fmt::format("camera {} was asked for, the scene has {}", picture.camera, scene.cameras.size())};
   }
   if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
-    return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}'", execution.policy)};
+    return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
+                                                fmt::join(drain_policy_names(), ", "))};
   }
   return {};
 }
