@@ -45,7 +45,9 @@ const std::vector<SourceFile>& sources() {
   return files;
 }
 
-std::string place(const SourceFile& file, size_t index) { return file.name + ":" + std::to_string(index + 1) + ": "; }
+std::string place(const SourceFile& file, size_t index) {
+  return file.name + ":" + std::to_string(index + 1) + ": ";
+}
 
 /// What an #include line names, with its quotes or brackets; empty for other lines.
 std::string included(const std::string& line) {
@@ -60,11 +62,16 @@ std::string code_of(const std::string& line) {
   bool quoted = false;
   for (size_t i = 0; i < line.size(); ++i) {
     const bool character = !quoted && line.compare(i, 3, "'\"'") == 0;
-    if (character) i += 2;
-    else if (quoted && line[i] == '\\') ++i;
-    else if (line[i] == '"') quoted = !quoted;
-    else if (!quoted && line.compare(i, 2, "//") == 0) break;
-    else if (!quoted) code += line[i];
+    if (character)
+      i += 2;
+    else if (quoted && line[i] == '\\')
+      ++i;
+    else if (line[i] == '"')
+      quoted = !quoted;
+    else if (!quoted && line.compare(i, 2, "//") == 0)
+      break;
+    else if (!quoted)
+      code += line[i];
   }
   return code;
 }

@@ -1,0 +1,185 @@
+// A scene from generation to picture, as a user would go.
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "io/image.h"
+#include "tests/bins/small_scene.h"
+
+namespace shoal::testing {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr uint64_t kMaxPixels = 1 << 20;
+
+ExrImage read_picture(const std::string& path) {
+  auto image = read_exr(posix_file_system(), path, kMaxPixels);
+  if (!image.ok()) ADD_FAILURE() << image.error().message;
+  return image.ok() ? std::move(image).value() : ExrImage{};
+}
+
+json parsed(const std::string& text) {
+  json value = json::parse(text, nullptr, false);
+  EXPECT_FALSE(value.is_discarded()) << text.substr(0, 500);
+  return value;
+}
+
+void expect_keys(const json& object, const std::vector<std::string>& keys) {
+  for (const std::string& key : keys) EXPECT_TRUE(object.contains(key)) << key;
+}
+
+void expect_picture(const ExrImage& image, uint32_t width, uint32_t height, float samples) {
+  EXPECT_EQ(image.width, width);
+  EXPECT_EQ(image.height, height);
+  std::vector<std::string> names;
+  for (const ExrChannel& channel : image.channels) names.push_back(channel.name);
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("R", "G", "B", "A"));
+  ASSERT_TRUE(image.text.contains("software"));
+  EXPECT_THAT(image.text.at("software"), ::testing::StartsWith("Shoal "));
+  ASSERT_TRUE(image.numbers.contains("samplesPerPixel") && image.numbers.contains("renderTimeSeconds"));
+  EXPECT_EQ(image.numbers.at("samplesPerPixel"), samples);
+  EXPECT_GT(image.numbers.at("renderTimeSeconds"), 0);
+  EXPECT_TRUE(image.matrices.contains("worldToCamera") && image.matrices.contains("worldToNDC"));
+}
+
+void expect_stats(const json& stats, uint64_t samples) {
+  expect_keys(stats, {"schema_version", "program", "options", "machine", "scene", "memory", "render_seconds",
+                      "threads_count", "rays_per_second", "counters", "counter_list"});
+  if (::testing::Test::HasFailure()) return;
+  EXPECT_EQ(stats["schema_version"], 1);
+  expect_keys(stats["options"], {"width", "height", "samples_per_pixel", "camera", "bounces", "seed", "order",
+                                 "policy", "max_memory_bytes"});
+  expect_keys(stats["machine"], {"cpu", "hardware_threads_count", "memory_limit_bytes", "system", "compiler"});
+  expect_keys(stats["scene"], {"file", "file_bytes", "triangles_count", "treelets_count", "instances_count"});
+  expect_keys(stats["counters"], {"totals", "by_kind", "by_bounce"});
+  for (const json& counter : stats["counter_list"]) {
+    expect_keys(counter, {"name", "unit", "meaning"});
+    EXPECT_TRUE(stats["counters"]["totals"].contains(counter["name"].get<std::string>())) << counter;
+  }
+  const json& totals = stats["counters"]["totals"];
+  EXPECT_EQ(totals["samples_committed_count"], samples);
+  EXPECT_EQ(totals["page_requests_count"],
+            totals["page_hits_count"].get<uint64_t>() + totals["page_misses_count"].get<uint64_t>());
+  uint64_t traced = 0;
+  for (const json& bounce : stats["counters"]["by_bounce"]) traced += bounce["rays_traced_count"].get<uint64_t>();
+  EXPECT_EQ(totals["rays_traced_count"], traced);
+  EXPECT_EQ(stats["counters"]["by_kind"]["camera"]["rays_traced_count"], samples);
+}
+
+TEST(RenderScene, GeneratedTerrainGoesFromTrianglesToPicture) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const std::string scene = folder / "terrain.shoal";
+  const ProgramRun info = run_shoal(folder, {"info", scene});
+  expect_exit(info, 0);
+  EXPECT_THAT(info.out, HasSubstr("20000 stored"));
+  const ProgramRun info_json = run_shoal(folder, {"info", scene, "--json"});
+  expect_exit(info_json, 0);
+  const json description = parsed(info_json.out);
+  EXPECT_EQ(description["triangles_count"], 20000);
+  EXPECT_EQ(description["file_bytes"], std::filesystem::file_size(scene));
+  const ProgramRun verify = run_shoal(folder, {"verify", scene});
+  expect_exit(verify, 0);
+  EXPECT_THAT(verify.out, HasSubstr("as it was written"));
+
+  const ProgramRun render = run_shoal(
+      folder, {"render", scene, "-o", folder / "out.exr", "--png", folder / "out.png", "--stats",
+               folder / "out.json", "--width", "40", "--height", "30", "--spp", "2", "--max-memory", "64M"});
+  expect_exit(render, 0);
+  EXPECT_THAT(render.out, HasSubstr("read from disk"));
+  EXPECT_THAT(render.err, HasSubstr("memory: cap 64.0 MiB"));
+  expect_picture(read_picture(folder / "out.exr"), 40, 30, 2);
+  const std::string png = file_text(folder / "out.png");
+  const auto preview = decode_image(std::as_bytes(std::span(png)), "out.png", kMaxPixels);
+  ASSERT_TRUE(preview.ok());
+  EXPECT_EQ(preview.value().width, 40u);
+  EXPECT_EQ(preview.value().height, 30u);
+  const json stats = parsed(file_text(folder / "out.json"));
+  expect_stats(stats, 40 * 30 * 2);
+  EXPECT_EQ(stats["memory"]["cap_bytes"], 64u << 20);
+  EXPECT_LE(stats["memory"]["peak_rss_bytes"], 64u << 20);
+  EXPECT_GT(stats["memory"]["peak_rss_bytes"], 1u << 20);
+}
+
+TEST(RenderScene, CompareFindsTheOrdersIdentical) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const ProgramRun run = run_shoal(folder, join({"compare", folder / "terrain.shoal", "--orders",
+                                                 "queued,depth-first", "--out", folder / "compare"},
+                                                tiny_picture()));
+  expect_exit(run, 0);
+  EXPECT_THAT(run.out, HasSubstr("identical"));
+  const json report = parsed(file_text(folder / "compare/compare.json"));
+  EXPECT_EQ(report["pictures_identical"], true);
+  ASSERT_TRUE(report["orders"].contains("queued") && report["orders"].contains("depth-first"));
+  for (const char* order : {"queued", "depth-first"}) {
+    expect_stats(report["orders"][order], 24 * 16);
+    EXPECT_EQ(report["orders"][order]["options"]["order"], order);
+  }
+  EXPECT_EQ(report["orders"]["queued"]["counters"]["totals"]["rays_traced_count"],
+            report["orders"]["depth-first"]["counters"]["totals"]["rays_traced_count"]);
+}
+
+TEST(RenderScene, AGltfIsBuiltOnceIntoTheCacheAndAgainWhenItChanges) {
+  const TemporaryFolder folder;
+  WrittenScene scene = one_triangle();
+  save(scene, folder / "scene");
+  const std::vector<std::string> render = join({"render", folder / "scene/scene.gltf", "-o", folder / "out.exr",
+                                                "--cache-dir", folder / "cache", "--progress", "none"},
+                                               tiny_picture());
+  const ProgramRun first = run_shoal(folder, render);
+  expect_exit(first, 0);
+  EXPECT_THAT(first.err, HasSubstr("building "));
+  const std::vector<std::string> built = folder.names("cache");
+  ASSERT_EQ(built.size(), 1u);
+  const auto written = std::filesystem::last_write_time(folder / ("cache/" + built[0]));
+  const ProgramRun second = run_shoal(folder, render);
+  expect_exit(second, 0);
+  EXPECT_THAT(second.err, ::testing::Not(HasSubstr("building ")));
+  EXPECT_EQ(folder.names("cache"), built);
+  EXPECT_EQ(std::filesystem::last_write_time(folder / ("cache/" + built[0])), written);
+  expect_exit(run_shoal(folder, join(render, {"--treelet-size", "64K"})), 0);
+  EXPECT_EQ(folder.names("cache").size(), 2u);
+  scene.add_node({{"mesh", 0}, {"translation", {0, 0, -1}}});
+  save(scene, folder / "scene");
+  EXPECT_THAT(run_shoal(folder, render).err, HasSubstr("building "));
+  EXPECT_EQ(folder.names("cache").size(), 3u);
+}
+
+TEST(RenderScene, WithoutCacheFolderTheUsersIsTaken) {
+  const TemporaryFolder folder;
+  save(one_triangle(), folder / "scene");
+  expect_exit(run_shoal(folder, join({"render", folder / "scene/scene.gltf", "-o", folder / "out.exr", "--quiet"},
+                                     tiny_picture())),
+              0);
+  EXPECT_EQ(folder.names(".cache/shoal").size(), 1u);
+}
+
+TEST(RenderScene, OneTriangleWithoutCameraOrLightIsFramedUnderAConstantSky) {
+  const TemporaryFolder folder;
+  save(one_triangle(), folder / "scene");
+  const std::vector<std::string> render = {
+      "render", folder / "scene/scene.gltf", "-o", folder / "out.exr", "--width", "32", "--height", "32", "--spp",
+      "4"};
+  const ProgramRun run = run_shoal(folder, render);
+  expect_exit(run, 0);
+  EXPECT_THAT(run.err, HasSubstr("warning: the scene has no light: lit by a constant sky"));
+  const ExrImage image = read_picture(folder / "out.exr");
+  uint32_t covered = 0, lit = 0;
+  for (const ExrChannel& channel : image.channels) {
+    for (const float value : channel.values) {
+      ASSERT_GE(value, 0) << channel.name;
+      covered += channel.name == "A" && value == 1;
+      lit += channel.name == "G" && value > 0.1f;
+    }
+  }
+  EXPECT_GT(covered, 100u) << "the triangle is in the frame";
+  EXPECT_GT(lit, 900u) << "sky and triangle are lit";
+  const ProgramRun dark = run_shoal(folder, join(render, {"--environment", "constant:0,0,0"}));
+  expect_exit(dark, 0);
+  EXPECT_THAT(dark.err, HasSubstr("warning: the scene has no light and the environment is black"));
+}
+
+}  // namespace
+}  // namespace shoal::testing
