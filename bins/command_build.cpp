@@ -26,6 +26,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   }
   SHOAL_RETURN_IF_ERROR(check_output(arguments.output));
   options.progress = build_progress(console);
+  options.stop = stop_on_signals();
   return build_scene(posix_file_system(), arguments.scene, arguments.output, options);
 }
 
@@ -54,7 +55,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("-o,--output", arguments->output, "the .shoal to write")->required();
   sub->add_option("--treelet-size", arguments->treelet_size, "bytes of a treelet, 4K to 4M (default 256K)");
   sub->add_option("--max-memory", arguments->max_memory, "cap on the whole process, such as 2G");
-  sub->add_option("--threads", arguments->threads, "threads; 0: all")->capture_default_str();
+  sub->add_option("--threads", arguments->threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_build(*arguments, console); };
   });

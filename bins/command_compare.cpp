@@ -68,7 +68,7 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared,
     json["orders"][std::string(order_name(r.execution.order))] =
         nlohmann::ordered_json::parse(stats_json(r.result, prepared.scene, prepared.picture, r.execution));
   }
-  const std::string text = json.dump(1) + "\n";
+  const std::string text = json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   return write_whole_file(posix_file_system(), arguments.out + "/compare.json", std::as_bytes(std::span(text)));
 }
 

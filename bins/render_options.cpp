@@ -44,6 +44,7 @@ Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOp
   if (std::filesystem::exists(path, code)) return path;
   console.info(fmt::format("building {} into {}", arguments.scene, path));
   options.progress = build_progress(console);
+  options.stop = stop_on_signals();
   auto report = build_scene(fs, arguments.scene, path, options);
   console.end_progress();
   if (!report.ok()) return std::move(report).error();
@@ -90,10 +91,11 @@ Result<uint64_t> parse_size(const std::string& text) {
     const size_t at = std::string("KMGT").find(static_cast<char>(std::toupper(static_cast<unsigned char>(unit[0]))));
     if (at != std::string::npos) shift = 10 * (static_cast<int>(at) + 1);
   }
-  if (code != std::errc() || shift < 0 || !(value > 0) || value > 1e15) {
+  const double bytes = shift < 0 ? 0 : value * static_cast<double>(1ull << shift);
+  if (code != std::errc() || !(bytes >= 1) || bytes >= 0x1p62) {
     return Error{ErrorCode::kUsage, fmt::format("'{}' is not a size: expected a number with K, M, G or T", text)};
   }
-  return static_cast<uint64_t>(value * static_cast<double>(1ull << shift));
+  return static_cast<uint64_t>(bytes);
 }
 
 Result<uint32_t> parse_treelet_size(const std::string& text) {
@@ -153,7 +155,7 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   app.add_option("--camera", picture.camera, "index among the scene's cameras")->capture_default_str();
   app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
-  app.add_option("--threads", execution.threads, "threads; 0: all")->capture_default_str();
+  app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   app.add_option("--max-memory", max_memory, "cap on the whole process, such as 2G (default: 70 % of what there is)");
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")
       ->capture_default_str()
@@ -198,13 +200,17 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console&
   return prepared;
 }
 
-RenderHooks console_hooks(Console& console) {
+const std::atomic<bool>* stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = on_signal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  return &g_stop;
+}
+
+RenderHooks console_hooks(Console& console) {
   RenderHooks hooks;
-  hooks.stop = &g_stop;
+  hooks.stop = stop_on_signals();
   hooks.progress = [&console](const RenderProgress& p) {
     const double fraction = static_cast<double>(p.samples_done) / static_cast<double>(p.samples_total);
     console.show_progress("rendering", fraction, p.seconds,

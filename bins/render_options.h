@@ -46,6 +46,8 @@ struct PreparedRender {
 /// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment.
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console& console);
 
+/// Becomes true at SIGINT or SIGTERM, from this call on.
+const std::atomic<bool>* stop_on_signals();
 /// Hooks that show progress and stop on SIGINT and SIGTERM.
 RenderHooks console_hooks(Console& console);
 /// The memory plan as one log line.

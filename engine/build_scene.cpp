@@ -54,6 +54,11 @@ class SceneBuilder {
   }
 
  private:
+  Status check_stop() const {
+    if (options_.stop == nullptr || !options_.stop->load(std::memory_order_relaxed)) return {};
+    return Error{ErrorCode::kStopped, fmt::format("{}: the build was stopped before it was complete", path_)};
+  }
+
   void progress(const char* stage, double fraction) const {
     if (options_.progress) options_.progress({stage, fraction});
   }
@@ -107,6 +112,7 @@ class SceneBuilder {
       SHOAL_ASSIGN_OR_RETURN(TriangleSoup soup, read_object(files, object));
       emitters_of_.push_back(collect_emitters(soup, materials_.materials));
       progress("building", static_cast<double>(read_triangles_) / static_cast<double>(total_triangles_));
+      SHOAL_RETURN_IF_ERROR(check_stop());
       BuiltObject built;
       if (soup.size() > 0) {
         SHOAL_ASSIGN_OR_RETURN(built, build_object(std::move(soup), {options_.treelet_bytes}, &coverage, sink));
@@ -135,6 +141,7 @@ class SceneBuilder {
         SHOAL_RETURN_IF_ERROR(append_primitive(files, document_, materials_, source, bake, soup, counts));
         read_triangles_ += source.triangle_count;
         progress("reading", static_cast<double>(read_triangles_) / static_cast<double>(total_triangles_));
+        SHOAL_RETURN_IF_ERROR(check_stop());
       }
     }
     report_.degenerate_count += counts.degenerate_count;

@@ -3,6 +3,7 @@
 // Called by bins. Parallel inside. Cost: see docs/measuring.md.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -23,6 +24,7 @@ struct SceneBuildOptions {
   unsigned threads = 0;           ///< 0: all
   uint64_t max_memory_bytes = 0;  ///< 0: no cap; else a scene that needs more is refused before it is read
   gltf::Limits limits;
+  const std::atomic<bool>* stop = nullptr;             ///< ends the build with kStopped when it becomes true
   std::function<void(const BuildProgress&)> progress;  ///< may be empty; called from the building thread
 };
 
@@ -35,7 +37,7 @@ struct SceneBuildReport {
   std::vector<std::string> warnings;
 };
 
-/// Fails with: kInput, kUnsupported, kStorage, kMemoryCap; nothing is left under `output` then. The same source and
+/// Fails with: kInput, kUnsupported, kStorage, kMemoryCap, kStopped; nothing is left under `output` then. The same source and
 /// options give the same bytes, whatever the number of threads.
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
                                      const SceneBuildOptions& options);

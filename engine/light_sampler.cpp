@@ -70,7 +70,7 @@ void LightSampler::weigh_emitters() {
   std::vector<double> weights;
   weights.reserve(scene_->emitters.size());
   for (const Emitter& e : scene_->emitters) {
-    weights.push_back(emitter_area(e) * scene_->materials[e.material].emission_weight);
+    weights.push_back(emitter_area(e) * sampled_weight(scene_->materials[e.material]));
   }
   emitters_ = Distribution1D(weights);
 }

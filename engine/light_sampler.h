@@ -47,12 +47,17 @@ class LightSampler {
   LightSample sample(const Vec3& position, const LightRandom& random) const;
 
   /// Density by area with which sample() finds a point on an emitter of this material; 0 when it never does.
-  double emitter_pdf(const Material& material) const { return emitter_density_ * material.emission_weight; }
+  double emitter_pdf(const Material& material) const { return emitter_density_ * sampled_weight(material); }
   /// Solid-angle density with which sample() finds a direction to the environment.
   double environment_pdf(const Vec3& direction) const;
   uint64_t resident_bytes() const { return lights_.resident_bytes() + emitters_.resident_bytes(); }
 
  private:
+  /// Emitters with coverage are found by chance only: a shadow ray ends before the emitter and so cannot ask whether
+  /// the emitter is there.
+  static double sampled_weight(const Material& material) {
+    return material.coverage == CoverageMode::kOpaque ? material.emission_weight : 0.0f;
+  }
   void weigh_emitters();
   LightSample sample_emitter(const Vec3& position, double chance, double choice, const LightRandom& random) const;
   LightSample sample_punctual(const PunctualLight& light, const Vec3& position, double chance) const;

@@ -49,6 +49,7 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   MemoryPlan plan;
   plan.cap_bytes = execution.max_memory_bytes;
   if (plan.cap_bytes == 0) plan.cap_bytes = memory_limit_bytes() / 10 * 7;
+  const bool asked_cap = execution.max_memory_bytes > 0;
   plan.process_bytes = resident_set_bytes();
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 4 * sizeof(float);
@@ -72,6 +73,12 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
     return Error{ErrorCode::kMemoryCap,
                  fmt::format("a page cache of {} bytes cannot hold the pages that {} threads need at once; the smallest "
                              "that works is {} bytes", execution.page_cache_bytes, threads, least_cache)};
+  }
+  if (const uint64_t peak = peak_resident_set_bytes(); asked_cap && peak > plan.cap_bytes) {
+    return Error{ErrorCode::kMemoryCap,
+                 fmt::format("the memory cap of {} was passed while the scene's tables and environment were read; the "
+                             "smallest that would work is about {}", in_mib(plan.cap_bytes),
+                             in_mib(std::max(peak, smallest) + kMiB))};
   }
   if (smallest > plan.cap_bytes) {
     return Error{ErrorCode::kMemoryCap,

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "engine/check_tables.h"
+#include "engine/process_memory.h"
 #include "engine/scene.h"
 
 namespace shoal {
@@ -13,12 +14,11 @@ namespace shoal {
 namespace {
 
 constexpr uint64_t kMaxTextBytes = 64u << 20;
-constexpr uint64_t kMaxTableBytes = 1ull << 36;
 
 template <class T>
 Result<std::vector<T>> read_rows(const PageFile& file, TableId table, const char* name) {
   static_assert(std::is_trivially_copyable_v<T>);
-  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, kMaxTableBytes));
+  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, memory_limit_bytes() / 4));
   if (bytes.size() % sizeof(T) != 0) {
     return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected rows of {} bytes, found {} bytes",
                                                   file.path(), name, sizeof(T), bytes.size())};

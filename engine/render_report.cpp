@@ -148,7 +148,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   for (const CounterInfo& info : counter_list()) {
     units.push_back({{"name", info.name}, {"unit", info.unit}, {"meaning", info.sentence}});
   }
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string traffic_table(const std::vector<TrafficColumn>& columns) {

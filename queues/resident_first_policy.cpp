@@ -1,5 +1,7 @@
 // resident-first: the fullest treelet that is in memory, unless what waits there is less than a minimum batch while a
 // treelet on disk has more; then the one that most wait for is loaded. Fewest bytes read of the policies measured.
+#include <algorithm>
+
 #include "queues/drain_policy.h"
 
 namespace shoal {
@@ -7,7 +9,7 @@ namespace {
 
 class ResidentFirstPolicy final : public DrainPolicy {
  public:
-  explicit ResidentFirstPolicy(uint32_t minimum_batch) : minimum_batch_(minimum_batch) {}
+  explicit ResidentFirstPolicy(uint32_t minimum_batch) : minimum_batch_(std::max(minimum_batch, 1u)) {}
 
   TreeletId choose(const WaitingView& view, bool /*more_coming*/) override {
     TreeletId in_memory = kNoIndex, anywhere = kNoIndex;
