@@ -41,7 +41,7 @@ class SceneBuilder {
     SHOAL_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(fs_, output));
     CoverageTextures coverage(materials_.textures.size());
     SHOAL_RETURN_IF_ERROR(store_textures(files, writer, coverage));
-    TreeletPageSink sink(writer);
+    TreeletPageSink sink(writer, options_.stop);
     SHOAL_RETURN_IF_ERROR(build_objects(files, coverage, sink));
     SHOAL_RETURN_IF_ERROR(place_objects());
     report_.source_read_bytes += files.read_bytes();

@@ -49,7 +49,6 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   MemoryPlan plan;
   plan.cap_bytes = execution.max_memory_bytes;
   if (plan.cap_bytes == 0) plan.cap_bytes = memory_limit_bytes() / 10 * 7;
-  const bool asked_cap = execution.max_memory_bytes > 0;
   plan.process_bytes = resident_set_bytes();
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 4 * sizeof(float);
@@ -68,17 +67,13 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
 
   const uint64_t fixed = plan.process_bytes + plan.film_bytes + plan.scratch_bytes;
   const uint64_t least_pages = std::max(least_cache, execution.page_cache_bytes);
-  const uint64_t smallest = fixed + paths_bytes(least_paths) + least_pages;
+  // Reading tables and an environment may have taken more for a while than stays resident: a cap is for the whole run.
+  const uint64_t peak = execution.max_memory_bytes > 0 ? peak_resident_set_bytes() : 0;
+  const uint64_t smallest = std::max(peak, fixed + paths_bytes(least_paths) + least_pages);
   if (execution.page_cache_bytes > 0 && execution.page_cache_bytes < least_cache) {
     return Error{ErrorCode::kMemoryCap,
                  fmt::format("a page cache of {} bytes cannot hold the pages that {} threads need at once; the smallest "
                              "that works is {} bytes", execution.page_cache_bytes, threads, least_cache)};
-  }
-  if (const uint64_t peak = peak_resident_set_bytes(); asked_cap && peak > plan.cap_bytes) {
-    return Error{ErrorCode::kMemoryCap,
-                 fmt::format("the memory cap of {} was passed while the scene's tables and environment were read; the "
-                             "smallest that would work is about {}", in_mib(plan.cap_bytes),
-                             in_mib(std::max(peak, smallest) + kMiB))};
   }
   if (smallest > plan.cap_bytes) {
     return Error{ErrorCode::kMemoryCap,

@@ -1,6 +1,7 @@
 // Queued: rays wait beside others that want the same treelet; a policy chooses the treelet, a thread takes it in
 // hand, shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new
 // camera samples are admitted as paths end.
+#include <new>
 #include <thread>
 
 #include "engine/queued_paths.h"
@@ -176,8 +177,13 @@ class QueuedWorker {
 
 void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy) {
   std::mutex policy_mutex;
-  run_on_threads(context.threads,
-                 [&](unsigned) { std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run(); });
+  run_on_threads(context.threads, [&](unsigned) {
+    try {
+      std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run();
+    } catch (const std::bad_alloc&) {  // the other threads would wait for this one's rays for ever
+      context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
+    }
+  });
 }
 
 }  // namespace shoal

@@ -11,6 +11,9 @@ namespace shoal {
 
 Result<TreeletId> TreeletPageSink::add(std::span<const std::byte> geometry, std::span<const std::byte> attributes) {
   SHOAL_CHECK(geometry.size() >= sizeof(TreeletHeader));
+  if (stop_ != nullptr && stop_->load(std::memory_order_relaxed)) {
+    return Error{ErrorCode::kStopped, "the build was stopped before it was complete"};
+  }
   const size_t largest = std::max(geometry.size(), attributes.size());
   if (largest > kMaxPageBytes) {
     return Error{ErrorCode::kUsage, fmt::format("a treelet's page: expected at most {} bytes, found {}: choose a "

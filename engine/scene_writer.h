@@ -2,6 +2,8 @@
 // Used by engine/build_scene from one thread at a time. Cost: the page writer's.
 #pragma once
 
+#include <atomic>
+
 #include <span>
 #include <vector>
 
@@ -14,7 +16,8 @@ namespace shoal {
 /// Appends a geometry page and, where there is one, its attribute page.
 class TreeletPageSink : public TreeletSink {
  public:
-  explicit TreeletPageSink(PageFileWriter& writer) : writer_(&writer) {}
+  /// `stop`: may be nullptr; add() fails with kStopped once it is true.
+  TreeletPageSink(PageFileWriter& writer, const std::atomic<bool>* stop) : writer_(&writer), stop_(stop) {}
   Result<TreeletId> add(std::span<const std::byte> geometry, std::span<const std::byte> attributes) override;
 
   const std::vector<TreeletPages>& treelets() const { return treelets_; }
@@ -23,6 +26,7 @@ class TreeletPageSink : public TreeletSink {
 
  private:
   PageFileWriter* writer_;
+  const std::atomic<bool>* stop_;
   std::vector<TreeletPages> treelets_;
   uint64_t geometry_bytes_ = 0, attribute_bytes_ = 0;
   uint32_t largest_geometry_bytes_ = 0, largest_attribute_bytes_ = 0;

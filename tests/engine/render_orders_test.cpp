@@ -76,7 +76,8 @@ class RenderOrders : public ::testing::Test {
       const auto built = build_scene(fs, gltf, shoal, build);
       EXPECT_TRUE(built.ok()) << built.error().message;
     }
-    const auto scene = open_scene(fs, shoal, ReadMode::kBuffered, {v.more_levels});
+    const ReadMode mode = v.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
+    const auto scene = open_scene(fs, shoal, mode, {v.more_levels});
     EXPECT_TRUE(scene.ok()) << scene.error().message;
     ExecutionOptions execution;
     execution.order = v.order;

@@ -31,6 +31,14 @@ TEST(DrainPolicy, EveryNamedPolicyChoosesWorkWhenNoMoreIsComing) {
   EXPECT_EQ(make_drain_policy("best", {}), nullptr);
 }
 
+TEST(DrainPolicy, LimitsOfZeroStillFindTheWork) {
+  const PolicyOptions none{.queue_capacity = 0, .minimum_batch = 0};
+  for (const std::string_view name : drain_policy_names()) {
+    EXPECT_EQ(make_drain_policy(name, none)->choose(FixedView({0, 3}), false), 1u) << name;
+    EXPECT_EQ(make_drain_policy(name, none)->choose(FixedView({0, 0}), false), kNoIndex) << name;
+  }
+}
+
 TEST(DrainPolicy, FullestTakesTheLargestAndTheSmallestIdOfEquals) {
   EXPECT_EQ(make_fullest_policy()->choose(FixedView({4, 9, 9, 2}), true), 1u);
 }
