@@ -20,7 +20,7 @@ enum class ErrorCode : uint8_t {
   kMemoryCap = 5,    ///< the memory cap cannot work
   kStorage = 6,      ///< disk full or an I/O error
   kCorrupt = 7,      ///< a .shoal file whose bytes are not what was written
-  kStopped = 9,      ///< stopped by a signal, resumable
+  kStopped = 9,      ///< stopped by a signal; nothing was written
 };
 
 struct Error {
