@@ -2,7 +2,7 @@
 // scene's pages. Warm program, cold page cache (each run starts with an empty one; reads are direct, so that the
 // operating system's cache does not serve them). Median and range of several runs; the pictures must be identical.
 //
-//   bench/order_traffic [--triangles N] [--scene F.shoal] [--runs N] [--short] [--json F]
+//   bench/order_traffic [--triangles N] [--scene F.shoal] [--runs N] [--size PIXELS] [--spp N] [--short] [--json F]
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -15,8 +15,9 @@ namespace {
 constexpr uint64_t kMiB = 1ull << 20;
 /// Paths beyond this many in flight were not seen to pay in memory; out of core the share below decides.
 constexpr uint32_t kDefaultPaths = 1u << 19;
-constexpr uint32_t kMinimumPaths = 512;
-/// Of what is left after everything fixed, the part that rays in flight may take when pages do not all fit.
+constexpr uint32_t kMinimumPaths = 512;  ///< chosen: eight full blocks
+/// Of what is left after everything fixed, the part that rays in flight may take when pages do not all fit: chosen, not
+/// yet measured.
 constexpr double kPathShare = 0.25;
 
 uint64_t all_page_bytes(const PageFile& file) {
@@ -52,7 +53,7 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   plan.process_bytes = resident_set_bytes();
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 4 * sizeof(float);
-  // A thread: its stack, the block in hand, a page as stored (direct reads need their own buffer).
+  // A thread: its stack, the block in hand, a page (direct reads need their own buffer).
   plan.scratch_bytes = 8 * kMiB + threads * (1 * kMiB + largest_page_bytes(*scene.file) + 2 * kPageAlignment) +
                        PageCache::overhead_bytes(*scene.file);
   plan.scene_page_bytes = all_page_bytes(*scene.file);

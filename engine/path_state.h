@@ -18,7 +18,7 @@ struct PathState {
   uint32_t bounce = 0;              ///< 0: the camera ray's hit is shaded next
   uint32_t flags = 0;               ///< PathFlags: the render loop's, not the shader's
   Vec3 throughput{1};
-  float bsdf_pdf = 0;               ///< solid-angle density of the direction of `ray`; 0: camera (no MIS)
+  float bsdf_pdf = 0;               ///< solid-angle density of `direction`; 0: camera (no MIS)
   Vec3 radiance{0};
   uint32_t next_free = kNoIndex;    ///< link among free paths
   Vec3 shadow_radiance{0};          ///< added to radiance when the shadow ray arrives unoccluded

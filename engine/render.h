@@ -43,7 +43,7 @@ struct MemoryPlan {
   uint64_t film_bytes = 0;      ///< sums, and the picture while it is written
   uint64_t paths_bytes = 0;     ///< path states, their rays, queues
   uint64_t cache_bytes = 0;     ///< pages of geometry, attributes and textures
-  uint64_t scratch_bytes = 0;   ///< stacks, read buffers, the allocator's slack
+  uint64_t scratch_bytes = 0;   ///< stacks, read buffers, the cache's bookkeeping, the allocator's slack
   uint32_t paths_in_flight = 0;
   uint64_t scene_page_bytes = 0;  ///< all pages decoded: what the cache would hold if it could
 
@@ -63,7 +63,7 @@ struct RenderProgress {
 
 struct RenderHooks {
   std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
-  std::function<void(const RenderProgress&)> progress;  ///< may be empty; called a few times a second from one thread
+  std::function<void(const RenderProgress&)> progress;  ///< may be empty; now and then, one call at a time
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
 };
 

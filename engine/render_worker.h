@@ -74,7 +74,7 @@ class RenderWorker {
     return counters_.rays[static_cast<size_t>(kind_of(ray))][counted_bounce_of(ray)];
   }
   RenderCounters& counters() { return counters_; }
-  /// Calls the progress hook from the first thread now and then; sees stop requests.
+  /// Calls the progress hook now and then, unless another thread is in it; sees stop requests.
   void report_progress();
   /// Adds this worker's counters to the context. Called once, at the end.
   void hand_in();

@@ -25,7 +25,7 @@
 
 namespace shoal {
 
-/// Counted by the caller's thread, summed by the render (io/counters.h names them).
+/// Counted by the caller's thread, summed by the render (engine/counters.h names them).
 struct CacheCounters {
   uint64_t page_requests_count = 0;  ///< = hits + misses
   uint64_t page_hits_count = 0;

@@ -1,5 +1,5 @@
 // Which treelet is worked on next: one policy a file behind this interface. A policy sees numbers and returns a
-// decision as a value; it moves nothing itself. Called by engine/render_queued under the scheduler's lock.
+// decision as a value; it moves nothing itself. Called by engine/render_queued under a lock, one choice at a time.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // resident-first: the fullest treelet that is in memory, unless what waits there is less than a minimum batch while a
-// treelet on disk has more; then the one that most wait for is loaded. Fewest bytes read of the policies measured.
+// treelet on disk has more; then the one that most wait for is loaded. Fewest bytes read of
+// the policies measured in a prototype (docs/decisions/0008).
 #include <algorithm>
 
 #include "queues/drain_policy.h"

@@ -33,7 +33,7 @@ struct alignas(64) Ray {
   Vec3 origin{0};                //  0  world space
   float t = 0;                   // 12  the end of the ray, then of its closest hit; the start is 0 (exclusive)
   Vec3 direction{0};             // 16  world space, any length but zero
-  uint32_t path = 0;             // 28  index of the path that owns it; kAnyHitBit set for shadow rays
+  uint32_t path = 0;             // 28  bit 31: kAnyHitBit; the rest is the engine's (engine/path_ray.h)
   Hit hit;                       // 32
   uint32_t cursor = kNoIndex;    // 48  (top node << 3 | slot) of the child taken last; kNoIndex before the start
   uint32_t instance = kNoIndex;  // 52  the instance in whose tree the cursor is
@@ -42,7 +42,6 @@ struct alignas(64) Ray {
 
   static constexpr uint32_t kAnyHitBit = 0x80000000u;
   bool any_hit() const { return (path & kAnyHitBit) != 0; }
-  uint32_t path_index() const { return path & ~kAnyHitBit; }
 };
 static_assert(sizeof(Ray) == 64 && alignof(Ray) == 64);
 
