@@ -42,6 +42,8 @@ struct RenderContext {
 /// Seconds of a monotonic clock.
 double now_seconds();
 
+class QueuedPaths;
+
 class RenderWorker {
  public:
   explicit RenderWorker(RenderContext& context);
@@ -97,7 +99,7 @@ class RenderWorker {
 
 /// The two orders. Both return when every sample is in the film or context.ended is set.
 void render_depth_first(RenderContext& context);
-void render_queued(RenderContext& context, class QueuedPaths& paths, DrainPolicy& policy);
+void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy);
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work);
