@@ -1,4 +1,4 @@
-// What the operating system says of memory: limits (physical, cgroup v1 and v2) and this process's resident set.
+// What the operating system says of memory: limits (physical, engine/cgroup_limit) and this process's resident set.
 // Called by engine/memory_plan and the reports. Linux.
 #pragma once
 
