@@ -169,6 +169,11 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--rays-in-flight", execution.rays_in_flight, "rays that may wait at once (default: from the plan)")
       ->group("For experiments");
+  app.add_option("--tile-sample", picture.tile_sample,
+                 "render one in so many tiles of 32 x 32 pixels, spread over the picture; figures are of those tiles")
+      ->check(CLI::Range(1u, 1u << 22))
+      ->capture_default_str()
+      ->group("For experiments");
   app.add_option("--state-levels", more_levels, "levels of traversal state kept in a ray, 0 to 32")
       ->check(CLI::Range(0, 32))
       ->group("For experiments");

@@ -24,6 +24,9 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   if (picture.samples == 0 || picture.samples > (1u << 22)) {
     return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
   }
+  if (picture.tile_sample == 0) {
+    return Error{ErrorCode::kUsage, "one in 0 tiles: must be at least one in 1"};
+  }
   const size_t cameras = std::max<size_t>(scene.cameras.size(), 1);
   if (picture.camera >= cameras) {
     return Error{ErrorCode::kUsage,
@@ -60,7 +63,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
 
   const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera],
                       picture.width, picture.height);
-  const SampleOrder samples(picture.width, picture.height, picture.samples);
+  const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample);
   Film film(picture.width, picture.height);
   const bool queued = execution.order == Order::kQueued;
   std::unique_ptr<QueuedPaths> paths;
@@ -93,6 +96,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   result.counters = context.counters;
   result.plan = plan;
   result.threads = execution.threads;
+  result.picture_share =
+      static_cast<double>(samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
   result.peak_cache_bytes = cache.peak_resident_bytes();
   result.seconds = now_seconds() - start;
   return result;

@@ -21,6 +21,7 @@ struct PictureOptions {
   uint32_t width = 512, height = 512;
   uint32_t samples = 16;
   uint32_t camera = 0;  ///< index among the scene's cameras; a scene without one is framed
+  uint32_t tile_sample = 1;  ///< for measuring: one in so many 32 x 32 tiles is rendered, the others stay black
   ShadingOptions shading;
 };
 
@@ -74,6 +75,7 @@ struct RenderResult {
   double seconds = 0;
   unsigned threads = 0;
   uint64_t peak_cache_bytes = 0;
+  double picture_share = 1;  ///< of the pixels, that were rendered (PictureOptions::tile_sample)
 };
 
 /// Renders and checks the counters' identities. Fails with: kInternal (they do not balance), kCorrupt, kStorage,

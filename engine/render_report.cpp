@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -76,6 +77,7 @@ Json options_json(const PictureOptions& picture, const ExecutionOptions& executi
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
           {"camera", picture.camera},
+          {"tile_sample", picture.tile_sample},
           {"bounces", picture.shading.bounces},
           {"seed", picture.shading.seed},
           {"order", order_name(execution.order)},
@@ -141,6 +143,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["memory"]["peak_cache_bytes"] = result.peak_cache_bytes;
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();
   json["render_seconds"] = result.seconds;
+  json["picture_share"] = result.picture_share;
   json["threads_count"] = result.threads;
   json["rays_per_second"] = static_cast<double>(rays.rays_traced_count) / result.seconds;
   json["counters"] = Json::parse(counters_json(result.counters));
@@ -165,6 +168,11 @@ std::string traffic_table(const std::vector<TrafficColumn>& columns) {
   using R = const RenderResult&;
   using C = const RenderCounters&;
   using T = const RayCounters&;
+  const bool whole = std::all_of(columns.begin(), columns.end(),
+                                 [](const TrafficColumn& column) { return column.result->picture_share == 1; });
+  if (!whole) {
+    row("of the picture (not scaled)", [](R r, C, T) { return fmt::format("{:.2f} %", 100 * r.picture_share); });
+  }
   row("read from disk", [](R, C c, T) { return format_bytes(c.disk_read_bytes); });
   row("disk reads", [](R, C c, T) { return fmt::format("{}", c.disk_reads_count); });
   row("treelet loads from disk", [](R, C c, T) { return fmt::format("{}", c.treelet_loads_count); });

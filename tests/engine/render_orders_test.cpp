@@ -143,6 +143,28 @@ SHOAL_REAL_SCENE_TEST(Lamp, "lamp/lamp.gltf", 0)
 SHOAL_REAL_SCENE_TEST(Helmet, "helmet/helmet.gltf", 1)
 SHOAL_REAL_SCENE_TEST(Kitchen, "kitchen/kitchen.gltf", 0)
 
+TEST_F(RenderOrders, ASampleOfTilesHasThePixelsOfTheWholePicture) {
+  const std::string gltf = generated("terrain", 20000);
+  PictureOptions picture = small_picture(0);
+  picture.width = 160, picture.height = 96;
+  const std::vector<float> whole = render_variation(gltf, picture, {.name = "whole"});
+  picture.tile_sample = 4;
+  const std::vector<float> sample = render_variation(gltf, picture, {.name = "one in four"});
+  const std::vector<float> depth_first =
+      render_variation(gltf, picture, {.name = "one in four, depth-first", .order = Order::kDepthFirst});
+  ASSERT_EQ(whole.size(), sample.size());
+  EXPECT_EQ(sample, depth_first);
+  size_t lit = 0, black = 0;
+  for (size_t i = 0; i < whole.size(); i += 4) {
+    const bool same = std::memcmp(&whole[i], &sample[i], 4 * sizeof(float)) == 0;
+    lit += sample[i] > 0 ? 1 : 0;
+    if (sample[i] == 0 && sample[i + 1] == 0 && sample[i + 2] == 0) ++black;
+    EXPECT_TRUE(same || (sample[i] == 0 && sample[i + 3] == 0)) << "pixel " << i / 4;
+  }
+  EXPECT_GT(lit, 160u * 96 / 8);
+  EXPECT_GT(black, 160u * 96 / 2);
+}
+
 TEST_F(RenderOrders, CountEveryRayOfAScene) {
   // A render whose counters do not balance fails, so what is left to show is that they count this scene's rays.
   const std::string gltf = generated("terrain", 20000);
