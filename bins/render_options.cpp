@@ -8,8 +8,10 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <system_error>
 
+#include "bins/choice_option.h"
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
 #include "treelets/build_object.h"
@@ -162,6 +164,23 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--queue-capacity", execution.policy_options.queue_capacity, "policy full: rays that fill a queue")
       ->capture_default_str()
+      ->group("For experiments");
+  static const std::map<std::string, ReadBackend> kBackends{
+      {"auto", ReadBackend::kAuto}, {"io_uring", ReadBackend::kUring}, {"threads", ReadBackend::kThreads}};
+  app.add_option("--eviction", execution.paging.eviction,
+                 "which page leaves first: least-waiting, least-demand, least-recent")
+      ->capture_default_str()
+      ->group("For experiments");
+  app.add_option("--read-depth", execution.paging.read_depth, "pages read ahead at once; 0: read when needed")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024))
+      ->group("For experiments");
+  app.add_option("--rays-ahead", execution.policy_options.rays_ahead,
+                 "policy resident-first: reads ahead once fewer rays wait in memory")
+      ->capture_default_str()
+      ->group("For experiments");
+  add_choice(app, "--read-backend", execution.paging.backend, kBackends, ": how pages are read ahead")
+      ->type_name("WAY")
       ->group("For experiments");
   app.add_option("--treelet-size", treelet_size, "bytes of a treelet when a glTF is built, 4K to 4M (default 256K)")
       ->group("For experiments");

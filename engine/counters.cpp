@@ -71,7 +71,7 @@ Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
   const RayCounters camera = c.of_kind(RayKind::kCamera);
   SHOAL_RETURN_IF_ERROR(expect_equal("page_requests_count", c.page_requests_count, "hits + misses",
                                      c.page_hits_count + c.page_misses_count));
-  SHOAL_RETURN_IF_ERROR(expect_equal("page_misses_count", c.page_misses_count, "loads of treelets, attributes, textures",
+  SHOAL_RETURN_IF_ERROR(expect_equal("misses + prefetches", c.page_misses_count + c.page_prefetches_count, "loads of treelets, attributes, textures",
                                      c.treelet_loads_count + c.attribute_loads_count + c.texture_loads_count));
   SHOAL_RETURN_IF_ERROR(expect_equal("rays_queued_count", rays.rays_queued_count, "rays_drained_count",
                                      rays.rays_drained_count));

@@ -20,6 +20,7 @@ namespace shoal {
   X(page_requests_count, "pages", "pages asked of the page cache")                                            \
   X(page_hits_count, "pages", "asked and resident")                                                           \
   X(page_misses_count, "pages", "asked and read from disk")                                                   \
+  X(page_prefetches_count, "pages", "read ahead from disk, before anyone asked")                              \
   X(page_evictions_count, "pages", "pages dropped to make room")                                              \
   X(disk_reads_count, "reads", "read requests to the disk")                                                   \
   X(disk_read_bytes, "bytes", "bytes asked of the disk")                                                      \

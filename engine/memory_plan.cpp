@@ -56,7 +56,8 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * 4 * sizeof(float);
   // A thread: its stack, the block in hand, a page (direct reads need their own buffer).
   plan.scratch_bytes = 8 * kMiB + threads * (1 * kMiB + largest_page_bytes(*scene.file) + 2 * kPageAlignment) +
-                       PageCache::overhead_bytes(*scene.file);
+                       PageCache::overhead_bytes(*scene.file, queued ? execution.paging : PagingOptions{.read_depth = 0}) +
+                       scene.file->page_count() * sizeof(TreeletId);
   plan.scene_page_bytes = all_page_bytes(*scene.file);
   const uint64_t least_cache = PageCache::minimum_capacity_bytes(*scene.file, threads);
 

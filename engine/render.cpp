@@ -6,6 +6,7 @@
 
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"
+#include "engine/treelet_scheduler.h"
 
 namespace shoal {
 namespace {
@@ -36,17 +37,21 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
     return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
                                                 fmt::join(drain_policy_names(), ", "))};
   }
+  if (make_eviction_policy(execution.paging.eviction) == nullptr) {
+    return Error{ErrorCode::kUsage, fmt::format("unknown eviction '{}': expected one of {}", execution.paging.eviction,
+                                                fmt::join(eviction_policy_names(), ", "))};
+  }
   return {};
 }
 
-/// Treelet of every geometry page, so that eviction knows what waits for a page.
-std::vector<TreeletId> treelet_of_pages(const Scene& scene) {
-  std::vector<TreeletId> treelets(scene.file->page_count(), kNoIndex);
-  for (TreeletId id = 0; id < scene.treelets.size(); ++id) {
-    treelets[scene.treelets[id].geometry] = id;
-    if (scene.treelets[id].attributes != kNoPage) treelets[scene.treelets[id].attributes] = id;
-  }
-  return treelets;
+/// Larger scenes decide for longer: a decision looks at every treelet.
+constexpr uint32_t kTreeletsADrain = 256;
+
+PolicyOptions scaled_policy(const ExecutionOptions& execution, uint32_t treelets) {
+  PolicyOptions options = execution.policy_options;
+  options.drains = std::max(options.drains, treelets / kTreeletsADrain);
+  options.loads = execution.paging.read_depth == 0 ? 0 : std::max(options.drains, 2 * execution.paging.read_depth);
+  return options;
 }
 
 }  // namespace
@@ -67,28 +72,35 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   Film film(picture.width, picture.height);
   const bool queued = execution.order == Order::kQueued;
   std::unique_ptr<QueuedPaths> paths;
+  const std::vector<TreeletId> page_treelets = treelet_of_pages(scene);
+  UsualBatches batches(scene.treelets.size());
   WaitingWork waiting;
   if (queued) {
     paths = std::make_unique<QueuedPaths>(static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight,
                                           execution.threads);
-    waiting = [&paths, treelets = treelet_of_pages(scene)](PageId page) -> uint64_t {
-      return treelets[page] == kNoIndex ? kTextureTileWork : paths->waiting(treelets[page]);
+    waiting = [&](PageId page) -> PageDemand {
+      const TreeletId treelet = page_treelets[page];
+      return treelet == kNoIndex ? PageDemand(kTextureTileWork) : PageDemand(paths->waiting(treelet), batches.of(treelet));
     };
   }
   PageCache cache(*scene.file, plan.cache_bytes,
                   [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
                     return check_page(scene, record, bytes);
                   },
-                  waiting);
+                  waiting, execution.paging);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
   if (queued) {
-    const std::unique_ptr<DrainPolicy> policy = make_drain_policy(execution.policy, execution.policy_options);
-    render_queued(context, *paths, *policy);
+    const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
+        execution.policy, scaled_policy(execution, static_cast<uint32_t>(scene.treelets.size())));
+    TreeletScheduler scheduler(scene, *paths, cache, *policy, page_treelets);
+    render_queued(context, *paths, scheduler, batches);
   } else {
     render_depth_first(context);
   }
+  cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);
+  add_cache_counters(cache.background_counters(), context.counters);
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
 
   RenderResult result;

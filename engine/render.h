@@ -12,6 +12,7 @@
 #include "engine/counters.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
+#include "io/page_loader.h"
 #include "io/result.h"
 #include "queues/drain_policy.h"
 
@@ -35,6 +36,7 @@ struct ExecutionOptions {
   uint64_t rays_in_flight = 0;      ///< 0: from the plan; rounded up to one block
   std::string policy = "resident-first";
   PolicyOptions policy_options;
+  PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
 };
 
 /// Where the memory of a render goes; made before anything is allocated, printed before work starts.

@@ -1,50 +1,42 @@
 // Queued: rays wait beside others that want the same treelet; a policy chooses the treelet, a thread takes it in
 // hand, shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new
 // camera samples are admitted as paths end.
+#include <chrono>
 #include <new>
 #include <thread>
 
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"
+#include "engine/treelet_scheduler.h"
 
 namespace shoal {
 namespace {
 
 /// New paths are begun in batches, so that taking free ones and counting samples costs a lock a batch.
 constexpr uint32_t kMaxAdmitBatch = 1024;
-
-class Waiting final : public WaitingView {
- public:
-  Waiting(const RenderContext& context, const QueuedPaths& paths) : context_(context), paths_(paths) {}
-  uint32_t treelet_count() const override { return paths_.rays.treelet_count(); }
-  uint32_t waiting(TreeletId treelet) const override { return paths_.waiting(treelet); }
-  bool resident(TreeletId treelet) const override {
-    return context_.cache.resident(context_.scene.treelets[treelet].geometry);
-  }
-
- private:
-  const RenderContext& context_;
-  const QueuedPaths& paths_;
-};
+/// A thread with nothing to do looks again after this long, whatever the disk does.
+constexpr std::chrono::microseconds kLoadWait{1000};
 
 class QueuedWorker {
  public:
-  QueuedWorker(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy, std::mutex& policy_mutex)
+  QueuedWorker(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches)
       : context_(context),
         paths_(paths),
-        policy_(policy),
-        policy_mutex_(policy_mutex),
+        scheduler_(scheduler),
+        batches_(batches),
         worker_(context),
         admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)) {}
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.samples.count()) {
       while (room_for(admit_batch_)) admit(admit_batch_);
-      const TreeletId treelet = choose();
+      const TreeletId treelet = scheduler_.choose(room_for(admit_batch_), worker_.cache_counters());
       if (treelet != kNoIndex) {
         drain(treelet);
       } else if (room_for(1)) {
         admit(admit_batch_);
+      } else if (context_.cache.loading_count() > 0) {
+        context_.cache.wait_for_load(kLoadWait);
       } else {
         std::this_thread::yield();  // other threads have the last rays in hand
       }
@@ -58,11 +50,6 @@ class QueuedWorker {
   bool room_for(uint32_t paths) const {
     return paths_.free_count() >= paths && !context_.ended.load(std::memory_order_relaxed) &&
            context_.next_sample.load(std::memory_order_relaxed) < context_.samples.count();
-  }
-
-  TreeletId choose() {
-    std::lock_guard guard(policy_mutex_);
-    return policy_.choose(Waiting(context_, paths_), room_for(admit_batch_));
   }
 
   /// Begins up to `wanted` new paths: addresses their camera rays and queues them.
@@ -84,9 +71,10 @@ class QueuedWorker {
   }
 
   void drain(TreeletId treelet) {
+    batches_.note(treelet, paths_.waiting(treelet));
     uint32_t path = paths_.to_shade.take(treelet);
     RayBatch batch = paths_.rays.take(treelet);
-    if (!worker_.take_in_hand(treelet)) return;
+    if (!worker_.take_in_hand(treelet) || (path != kNoIndex && !worker_.pin_attributes())) return;
     while (path != kNoIndex && !context_.ended.load(std::memory_order_relaxed)) {
       const uint32_t next = paths_.to_shade.next(path);
       ray_count_ = 0;
@@ -147,7 +135,7 @@ class QueuedWorker {
       worker_.shade_miss(path);
       return end(path_index);
     }
-    if (path.hit.treelet != worker_.in_hand()) {
+    if (path.hit.treelet != worker_.in_hand() || !worker_.attributes_at_hand()) {
       ++worker_.counters().paths_shaded_waiting_count;
       paths_.to_shade.push(path.hit.treelet, path_index);
       return;
@@ -164,8 +152,8 @@ class QueuedWorker {
 
   RenderContext& context_;
   QueuedPaths& paths_;
-  DrainPolicy& policy_;
-  std::mutex& policy_mutex_;
+  TreeletScheduler& scheduler_;
+  UsualBatches& batches_;
   RenderWorker worker_;
   uint32_t admit_batch_;
   Ray rays_[2];  ///< of the path being handled
@@ -175,11 +163,10 @@ class QueuedWorker {
 
 }  // namespace
 
-void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy) {
-  std::mutex policy_mutex;
+void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches) {
   run_on_threads(context.threads, [&](unsigned) {
     try {
-      std::make_unique<QueuedWorker>(context, paths, policy, policy_mutex)->run();
+      std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run();
     } catch (const std::bad_alloc&) {  // the other threads would wait for this one's rays for ever
       context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
     }

@@ -153,6 +153,12 @@ void RenderWorker::let_go() {
   in_hand_ = attributes_of_ = kNoIndex;
 }
 
+bool RenderWorker::attributes_at_hand() const {
+  if (attributes_of_ == in_hand_) return true;
+  const PageId page = context_.scene.treelets[in_hand_].attributes;
+  return page == kNoPage || context_.cache.resident(page);
+}
+
 bool RenderWorker::pin_attributes() {
   if (attributes_of_ == in_hand_) return true;
   const PageId page = context_.scene.treelets[in_hand_].attributes;
@@ -175,29 +181,36 @@ void RenderWorker::report_progress() {
   if (context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed)) {
     context_.fail({ErrorCode::kStopped, "the render was stopped before it was complete"});
   }
+  if (Status failure = context_.cache.failure(); !failure.ok()) context_.fail(std::move(failure).error());
   if (!context_.hooks.progress) return;
   const double now = now_seconds();
   if (now < next_report_seconds_ || !context_.mutex.try_lock()) return;
   next_report_seconds_ = now + 0.2;
   std::lock_guard guard(context_.mutex, std::adopt_lock);
-  context_.hooks.progress({context_.samples_done, context_.samples.count(), context_.disk_read_bytes,
+  context_.hooks.progress({context_.samples_done, context_.samples.count(),
+                           context_.disk_read_bytes + context_.cache.background_read_bytes(),
                            now - context_.start_seconds});
+}
+
+void add_cache_counters(const CacheCounters& cache, RenderCounters& c) {
+  c.page_requests_count += cache.page_requests_count;
+  c.page_hits_count += cache.page_hits_count;
+  c.page_misses_count += cache.page_misses_count;
+  c.page_prefetches_count += cache.page_prefetches_count;
+  c.page_evictions_count += cache.page_evictions_count;
+  c.disk_reads_count += cache.disk_reads_count;
+  c.disk_read_bytes += cache.disk_read_bytes;
+  c.decoded_bytes += cache.decoded_bytes;
+  c.treelet_loads_count += cache.treelet_loads_count;
+  c.treelet_load_bytes += cache.treelet_load_bytes;
+  c.attribute_loads_count += cache.attribute_loads_count;
+  c.texture_loads_count += cache.texture_loads_count;
 }
 
 void RenderWorker::hand_in() {
   let_go();
   RenderCounters& c = counters_;
-  c.page_requests_count = cache_counters_.page_requests_count;
-  c.page_hits_count = cache_counters_.page_hits_count;
-  c.page_misses_count = cache_counters_.page_misses_count;
-  c.page_evictions_count = cache_counters_.page_evictions_count;
-  c.disk_reads_count = cache_counters_.disk_reads_count;
-  c.disk_read_bytes = cache_counters_.disk_read_bytes;
-  c.decoded_bytes = cache_counters_.decoded_bytes;
-  c.treelet_loads_count = cache_counters_.treelet_loads_count;
-  c.treelet_load_bytes = cache_counters_.treelet_load_bytes;
-  c.attribute_loads_count = cache_counters_.attribute_loads_count;
-  c.texture_loads_count = cache_counters_.texture_loads_count;
+  add_cache_counters(cache_counters_, c);
   c.coverage_tests_count = trace_counters_.coverage_tests_count;
   c.vertices_shaded_count = shade_counters_.vertices_shaded_count;
   c.texture_lookups_count = shade_counters_.texture_lookups_count;

@@ -43,6 +43,8 @@ struct RenderContext {
 double now_seconds();
 
 class QueuedPaths;
+class TreeletScheduler;
+class UsualBatches;
 
 class RenderWorker {
  public:
@@ -71,19 +73,22 @@ class RenderWorker {
   bool take_in_hand(TreeletId treelet);
   TreeletId in_hand() const { return in_hand_; }
   void let_go();
+  /// Pins the attributes of the treelet in hand. Returns false on an error (context.ended is set).
+  bool pin_attributes();
+  /// Whether shading in the treelet in hand would read nothing from disk.
+  bool attributes_at_hand() const;
 
   RayCounters& ray_counters(const Ray& ray) {
     return counters_.rays[static_cast<size_t>(kind_of(ray))][counted_bounce_of(ray)];
   }
   RenderCounters& counters() { return counters_; }
+  CacheCounters& cache_counters() { return cache_counters_; }
   /// Calls the progress hook now and then, unless another thread is in it; sees stop requests.
   void report_progress();
   /// Adds this worker's counters to the context. Called once, at the end.
   void hand_in();
 
  private:
-  bool pin_attributes();
-
   RenderContext& context_;
   Shader shader_;
   PagePin geometry_, attributes_;
@@ -97,9 +102,12 @@ class RenderWorker {
   double next_report_seconds_ = 0;
 };
 
+/// What a cache counted joins the counters of the render.
+void add_cache_counters(const CacheCounters& cache, RenderCounters& counters);
+
 /// The two orders. Both return when every sample is in the film or context.ended is set.
 void render_depth_first(RenderContext& context);
-void render_queued(RenderContext& context, QueuedPaths& paths, DrainPolicy& policy);
+void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches);
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work);

@@ -1,12 +1,12 @@
-// Which resident pages go next. The page cache hands over all unpinned pages with their rank; the order keeps
+// Which resident pages go next. The page cache hands over all unpinned pages with their rank (io/eviction_policy.h); the order keeps
 // the lowest ones and gives them out one by one until they are used up, so that a ranking of n pages serves
 // many evictions.
 //
 // Properties and assumptions
-//   order    least waiting work first, then least recent use, then smallest page id.
+//   order    smallest rank first, then least recent use, then smallest page id.
 //   batch    one page up to kExactCount pages: the order is exact. Above, n / kBatchFraction pages a ranking: a
-//            page that was used since is skipped by the cache, so least recent use stays exact; waiting work may be
-//            stale by that fraction of the resident pages.
+//            page that was used since is skipped by the cache, so least recent use stays exact; the rank may be stale
+//            by that fraction of the resident pages.
 //   threads  one at a time (the page cache's lock).
 //   cost     kBatchFraction looks at a page an eviction, amortised.
 #pragma once
@@ -21,12 +21,12 @@
 namespace shoal {
 
 struct EvictionCandidate {
-  uint64_t waiting_work = 0;
+  uint64_t rank = 0;
   uint64_t last_use = 0;
   PageId page = kNoPage;
 
   bool operator<(const EvictionCandidate& other) const {
-    return std::tie(waiting_work, last_use, page) < std::tie(other.waiting_work, other.last_use, other.page);
+    return std::tie(rank, last_use, page) < std::tie(other.rank, other.last_use, other.page);
   }
 };
 
@@ -48,22 +48,23 @@ class EvictionOrder {
     if (batch < count) std::nth_element(candidates_.begin(), end, candidates_.end());
     candidates_.resize(batch);
     std::sort(candidates_.rbegin(), candidates_.rend());
-    most_work_ = candidates_.empty() ? 0 : candidates_.front().waiting_work;
+    highest_rank_ = candidates_.empty() ? 0 : candidates_.front().rank;
   }
 
   bool empty() const { return candidates_.empty(); }
   /// Requires: not empty.
+  const EvictionCandidate& next() const { return candidates_.back(); }
   EvictionCandidate take() {
     const EvictionCandidate next = candidates_.back();
     candidates_.pop_back();
     return next;
   }
-  /// The work that waited for the last page of the ranking: who has more by now has left the batch.
-  uint64_t most_work() const { return most_work_; }
+  /// Of the last page of the ranking: who ranks higher by now has left the batch.
+  uint64_t highest_rank() const { return highest_rank_; }
 
  private:
   std::vector<EvictionCandidate> candidates_;  // the next one last
-  uint64_t most_work_ = 0;
+  uint64_t highest_rank_ = 0;
 };
 
 }  // namespace shoal

@@ -22,6 +22,8 @@ class ReadableFile {
   virtual Status read_at(uint64_t offset, std::span<std::byte> out) = 0;
   virtual uint64_t size_bytes() const = 0;
   virtual const std::string& path() const = 0;
+  /// For reads that go on by themselves (io/async_reader); -1: read_at() is the only way.
+  virtual int descriptor() const { return -1; }
 };
 
 class WritableFile {

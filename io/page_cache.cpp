@@ -6,6 +6,21 @@
 
 namespace shoal {
 
+void CacheCounters::add(const CacheCounters& other) {
+  page_requests_count += other.page_requests_count;
+  page_hits_count += other.page_hits_count;
+  page_misses_count += other.page_misses_count;
+  page_prefetches_count += other.page_prefetches_count;
+  page_evictions_count += other.page_evictions_count;
+  disk_reads_count += other.disk_reads_count;
+  disk_read_bytes += other.disk_read_bytes;
+  decoded_bytes += other.decoded_bytes;
+  treelet_loads_count += other.treelet_loads_count;
+  treelet_load_bytes += other.treelet_load_bytes;
+  attribute_loads_count += other.attribute_loads_count;
+  texture_loads_count += other.texture_loads_count;
+}
+
 bool PageCache::State::try_pin(PageId page) {
   PageSlot& slot = slots[page];
   if ((slot.state.load(std::memory_order_relaxed) & kResident) == 0) return false;
@@ -64,13 +79,19 @@ Status PageCache::State::read(PageId page, std::byte* data, CacheCounters& count
   counters.disk_reads_count += read_bytes > 0 ? 1 : 0;
   counters.disk_read_bytes += read_bytes;
   if (!status.ok()) return status;
+  return check_read(page, data, counters);
+}
+
+/// Counts a page that has been read and decoded, and looks it over.
+Status PageCache::State::check_read(PageId page, std::byte* data, CacheCounters& counters) const {
+  const PageRecord& record = file.record(page);
   PageBuffers::zero_tail(data, record.raw_bytes);
   counters.decoded_bytes += record.raw_bytes;
   counters.treelet_loads_count += record.kind == PageKind::kTreelet ? 1 : 0;
   counters.treelet_load_bytes += record.kind == PageKind::kTreelet ? record.raw_bytes : 0;
   counters.attribute_loads_count += record.kind == PageKind::kAttributes ? 1 : 0;
   counters.texture_loads_count += record.kind == PageKind::kTexture ? 1 : 0;
-  return check ? check(record, bytes) : Status();
+  return check ? check(record, {data, record.raw_bytes}) : Status();
 }
 
 void PageCache::State::publish(PageId page, std::byte* data, uint32_t pins) {
@@ -84,10 +105,18 @@ void PageCache::State::publish(PageId page, std::byte* data, uint32_t pins) {
   slot.state.fetch_add(kResident + pins, std::memory_order_release);
 }
 
-PageCache::PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check, WaitingWork waiting)
-    : state_(std::make_unique<State>(file, capacity_bytes, std::move(check), std::move(waiting))) {}
+PageCache::PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check, WaitingWork waiting,
+                     const PagingOptions& paging)
+    : state_(std::make_unique<State>(file, capacity_bytes, std::move(check), std::move(waiting), paging.eviction)) {
+  SHOAL_CHECK(state_->eviction != nullptr);
+  if (paging.read_depth == 0 || !state_->waiting) return;
+  state_->loader = std::make_unique<PageLoader>(file, paging, [s = state_.get()](PageId page, std::byte* data, Status status) {
+    s->finish_prefetch(page, data, std::move(status));
+  });
+}
 
 PageCache::~PageCache() {
+  state_->loader.reset();
   for (const PageId page : state_->residents) SHOAL_CHECK(state_->slots[page].state.load() == kResident);
 }
 
@@ -102,9 +131,10 @@ uint64_t PageCache::minimum_capacity_bytes(const PageFile& file, unsigned thread
   return sum * threads;
 }
 
-uint64_t PageCache::overhead_bytes(const PageFile& file) {
+uint64_t PageCache::overhead_bytes(const PageFile& file, const PagingOptions& paging) {
   // A vector that grows holds up to twice what it needs.
-  return file.page_count() * (sizeof(PageSlot) + 2 * sizeof(PageId) + 2 * sizeof(EvictionCandidate));
+  return file.page_count() * (sizeof(PageSlot) + 2 * sizeof(PageId) + 2 * sizeof(EvictionCandidate)) +
+         PageLoader::buffer_bytes(file, paging);
 }
 
 Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
@@ -116,14 +146,16 @@ Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
     return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
   }
   std::unique_lock lock(s.mutex);
-  const auto under_way = s.loads.find(page);
-  if (under_way != s.loads.end()) {
-    counters.page_hits_count += 1;
+  for (auto under_way = s.loads.find(page); under_way != s.loads.end(); under_way = s.loads.find(page)) {
     const std::shared_ptr<PageLoad> load = under_way->second;
     load->waiting_threads += 1;
     s.loaded.wait(lock, [&] { return load->done; });
+    if (load->abandoned) continue;
+    counters.page_hits_count += 1;
     if (load->error) return *load->error;
-  } else if (s.try_pin(page)) {
+    return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
+  }
+  if (s.try_pin(page)) {
     counters.page_hits_count += 1;
   } else {
     counters.page_misses_count += 1;

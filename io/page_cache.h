@@ -4,23 +4,29 @@
 //   capacity   the sum of resident pages (rounded up to 4 KiB each) never exceeds capacity_bytes.
 //   ownership  a PagePin keeps its page resident; pins are short (one batch, one visit).
 //   threads    any number; two threads that miss the same page read it once, the second waits.
-//   order      among unpinned pages the one with the least waiting work goes first (see WaitingWork), ties
-//              by least recent use; with no WaitingWork this is plain LRU.
-//              Exact up to 512 resident pages; above, waiting work may be stale by one page in 16
-//              (eviction_order.h).
+//   order      among unpinned pages the one that the eviction policy ranks lowest goes first, ties by least recent
+//              use; with no WaitingWork this is plain LRU. Exact up to 512 resident pages; above, waiting work may
+//              be stale by one page in 16 (eviction_order.h).
+//   prefetch   prefetch() starts a read and returns; a loader thread verifies, decodes and publishes the page. It takes
+//              the room of a page only when less work waits for that one, so it cannot thrash, and never waits.
 //   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
 //              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
 //              most kMaxPinsPerThread pages.
-//   cost       a hit is one atomic increment and no lock; a miss reads, hashes and decompresses outside the lock.
+//   cost       a hit is one atomic increment and no lock; a miss reads, hashes and decompresses outside the lock; a
+//              prefetch takes the lock and one system call.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
+#include "io/eviction_policy.h"
 #include "io/page_file.h"
+#include "io/page_loader.h"
 #include "io/result.h"
 
 namespace shoal {
@@ -30,14 +36,17 @@ struct CacheCounters {
   uint64_t page_requests_count = 0;  ///< = hits + misses
   uint64_t page_hits_count = 0;
   uint64_t page_misses_count = 0;
+  uint64_t page_prefetches_count = 0;  ///< pages read ahead by prefetch()
   uint64_t page_evictions_count = 0;
   uint64_t disk_reads_count = 0;
   uint64_t disk_read_bytes = 0;      ///< bytes asked of the disk
   uint64_t decoded_bytes = 0;        ///< bytes of decoded pages
-  uint64_t treelet_loads_count = 0;  ///< misses of kTreelet pages
+  uint64_t treelet_loads_count = 0;  ///< kTreelet pages read
   uint64_t treelet_load_bytes = 0;   ///< decoded bytes of those
   uint64_t attribute_loads_count = 0;
   uint64_t texture_loads_count = 0;
+
+  void add(const CacheCounters& other);
 };
 
 class PageCache;
@@ -67,18 +76,23 @@ class PagePin {
   PageId page_ = kNoPage;
 };
 
-/// How much work waits for a page now; called under the cache's lock when it evicts. Must not call back.
-using WaitingWork = std::function<uint64_t(PageId)>;
-
 /// Looks over a page once, when it has been decoded, so that its readers need not check it again.
 /// Fails with: kCorrupt. Called from any thread, outside the lock.
 using PageCheck = std::function<Status(const PageRecord&, std::span<const std::byte>)>;
+
+enum class Prefetch : uint8_t {
+  kStarted,
+  kNotNeeded,  ///< resident, or being read already
+  kBusy,       ///< as many reads are under way as may be
+  kNoRoom,     ///< everything resident is pinned or has as much work waiting
+};
 
 class PageCache {
  public:
   static constexpr unsigned kMaxPinsPerThread = 3;  ///< a treelet, its attributes, a texture tile
 
-  PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {});
+  PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {},
+            const PagingOptions& paging = {});
   ~PageCache();
 
   /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread,
@@ -86,11 +100,27 @@ class PageCache {
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
 
   /// Memory that the cache takes beside its capacity: its slots, and room to rank what is resident.
-  static uint64_t overhead_bytes(const PageFile& file);
+  static uint64_t overhead_bytes(const PageFile& file, const PagingOptions& paging = {});
 
   /// Fails with: kStorage, kCorrupt (after which the render ends), kMemoryCap (a page larger than the capacity). A
   /// thread that waited for another's read of the page counts a hit. Requires: page < page_count() of the file.
   Result<PagePin> pin(PageId page, CacheCounters& counters);
+  /// Starts reading a page that will be wanted. A read that fails is kept (failure()): who asked may never pin it.
+  Prefetch prefetch(PageId page, CacheCounters& counters);
+  /// Moves the pages that prefetches brought since the last call to `pages` (cleared first).
+  void take_loaded(std::vector<PageId>& pages);
+  /// Prefetches under way.
+  unsigned loading_count() const;
+  /// Sleeps until a prefetch ends or the time is over; returns at once when none is under way or some are not taken yet.
+  void wait_for_load(std::chrono::microseconds at_most);
+  /// Waits until no prefetch is under way. Requires: none is started meanwhile.
+  void finish_loads();
+  /// The first prefetch that failed, or ok.
+  Status failure() const;
+  /// What prefetches read so far. Bytes may be asked for at any time, the rest once no prefetch is under way.
+  CacheCounters background_counters() const;
+  uint64_t background_read_bytes() const;
+
   /// A hint without a promise; used by schedulers to trace what is resident first.
   bool resident(PageId page) const;
   /// Memory held now: resident pages, pages being read, and buffers kept for the next page.

@@ -44,16 +44,43 @@ void PageCache::State::wait_for_room(std::unique_lock<std::mutex>& lock, CacheCo
   room_waiters.fetch_sub(1);
 }
 
-/// False when it saw every page pinned; the pages it had chosen may have been pinned under its eyes.
-bool PageCache::State::evict_one(CacheCounters& counters) {
-  while (!order.empty()) {
-    const EvictionCandidate next = order.take();
-    const bool stale = waiting ? waiting(next.page) > order.most_work()
-                               : slots[next.page].last_use.load(std::memory_order_relaxed) != next.last_use;
-    if (!stale && try_evict(next.page, counters)) return true;
+uint64_t PageCache::State::rank_of(PageId page) const {
+  return eviction->rank(waiting ? waiting(page) : PageDemand(), slots[page].last_use.load(std::memory_order_relaxed));
+}
+
+std::byte* PageCache::State::try_make_room(uint32_t bytes, uint64_t work, CacheCounters& counters) {
+  const uint64_t charge = PageBuffers::charge_bytes(bytes);
+  if (charge > capacity_bytes) return nullptr;
+  for (;;) {
+    const uint64_t spare = buffers.kept_bytes() - buffers.reusable_bytes(bytes);
+    if (used_bytes + spare + charge <= capacity_bytes) break;
+    if (spare > 0) {
+      buffers.release_other(bytes);
+    } else if (!evict_one(counters, work)) {
+      return nullptr;
+    }
   }
+  Result<std::byte*> buffer = buffers.take(bytes);
+  if (!buffer.ok()) return nullptr;
+  used_bytes += charge;
+  account();
+  return buffer.value();
+}
+
+/// Evicts the lowest page for which less than `below_work` waits. False when it saw every page pinned or too busy; the
+/// pages it had chosen may have been pinned under its eyes.
+bool PageCache::State::evict_one(CacheCounters& counters, uint64_t below_work) {
+  while (!order.empty()) {
+    const PageId page = order.next().page;
+    const bool stale = rank_of(page) > order.highest_rank();
+    if (!stale && below_work != ~0ull && work_of(page) >= below_work) break;
+    order.take();
+    if (!stale && try_evict(page, counters)) return true;
+  }
+  if (!order.empty()) return false;
   rank_candidates();
   while (!order.empty()) {
+    if (below_work != ~0ull && work_of(order.next().page) >= below_work) return false;
     if (try_evict(order.take().page, counters)) return true;
   }
   return false;
@@ -63,7 +90,7 @@ void PageCache::State::rank_candidates() {
   auto& candidates = order.start();
   for (const PageId page : residents) {
     if (slots[page].state.load() != kResident) continue;
-    candidates.push_back({waiting ? waiting(page) : 0, slots[page].last_use.load(std::memory_order_relaxed), page});
+    candidates.push_back({rank_of(page), slots[page].last_use.load(std::memory_order_relaxed), page});
   }
   order.rank();
 }

@@ -1,5 +1,5 @@
-// The inside of the page cache: slots, reads under way and the lock. Included by page_cache.cpp (pins and loads)
-// and page_cache_eviction.cpp (room for the next page). Thread rule: as the comments say. Cost: 24 bytes a page of
+// The inside of the page cache: slots, reads under way and the lock. Included by page_cache.cpp (pins and loads),
+// page_prefetch.cpp (reads ahead) and page_cache_eviction.cpp (room for the next page). Thread rule: as the comments say. Cost: 24 bytes a page of
 // the file.
 #pragma once
 
@@ -38,15 +38,18 @@ inline constexpr uint32_t kResident = 1u << 31;
 struct PageLoad {
   uint32_t waiting_threads = 0;
   bool done = false;
+  bool abandoned = false;  // never read after all: whoever waited tries again
   std::optional<Error> error;
 };
 
 struct PageCache::State {
-  State(const PageFile& page_file, uint64_t capacity, PageCheck page_check, WaitingWork waiting_work)
+  State(const PageFile& page_file, uint64_t capacity, PageCheck page_check, WaitingWork waiting_work,
+        const std::string& eviction_name)
       : file(page_file),
         capacity_bytes(capacity),
         check(std::move(page_check)),
         waiting(std::move(waiting_work)),
+        eviction(make_eviction_policy(waiting ? eviction_name : "least-recent")),
         slots(std::make_unique<PageSlot[]>(page_file.page_count())) {
     for (PageId page = 0; page < page_file.page_count(); ++page)
       slots[page].bytes = page_file.record(page).raw_bytes;
@@ -60,7 +63,12 @@ struct PageCache::State {
   Status load(PageId page, PageLoad& load, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
   Result<std::byte*> make_room(uint32_t bytes, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
   void wait_for_room(std::unique_lock<std::mutex>& lock, CacheCounters& counters);
-  bool evict_one(CacheCounters& counters);
+  /// Room for a prefetch at the cost of pages with less work only; nullptr when there is none.
+  std::byte* try_make_room(uint32_t bytes, uint64_t work, CacheCounters& counters);
+  bool evict_one(CacheCounters& counters, uint64_t below_work = ~0ull);
+  uint64_t rank_of(PageId page) const;
+  uint64_t work_of(PageId page) const { return waiting ? waiting(page).waiting : 0; }
+  void finish_prefetch(PageId page, std::byte* data, Status status);
   bool try_evict(PageId page, CacheCounters& counters);
   void rank_candidates();
   void publish(PageId page, std::byte* data, uint32_t pins);
@@ -68,11 +76,13 @@ struct PageCache::State {
 
   // Outside the lock.
   Status read(PageId page, std::byte* data, CacheCounters& counters) const;
+  Status check_read(PageId page, std::byte* data, CacheCounters& counters) const;
 
   const PageFile& file;
   const uint64_t capacity_bytes;
   const PageCheck check;
   const WaitingWork waiting;
+  const std::unique_ptr<EvictionPolicy> eviction;
   const std::unique_ptr<PageSlot[]> slots;
   std::atomic<uint64_t> tick{0};
   std::atomic<uint32_t> room_waiters{0};  // threads that sleep until a page is unpinned
@@ -87,6 +97,13 @@ struct PageCache::State {
   EvictionOrder order;
   PageBuffers buffers;
   uint64_t used_bytes = 0;  // charges of resident pages and of pages being read
+
+  CacheCounters background;            // of prefetches
+  std::optional<Error> first_failure;  // of a prefetch
+  std::vector<PageId> prefetched;      // published since take_loaded()
+  std::atomic<bool> failed{false};
+  std::atomic<uint64_t> background_bytes{0};
+  std::unique_ptr<PageLoader> loader;  // nullptr: no prefetching. Last: it ends before what it writes to
 };
 
 }  // namespace shoal

@@ -78,6 +78,18 @@ Status PageFile::read_page(PageId id, std::span<std::byte> out, uint64_t* read_b
   return status;
 }
 
+StoredRange PageFile::stored_range(PageId id) const { return {records_[id].offset, padded_bytes(records_[id])}; }
+
+Status PageFile::decode_page(PageId id, std::span<const std::byte> stored, std::span<std::byte> out) const {
+  const PageRecord& record = records_[id];
+  SHOAL_CHECK(stored.size() >= record.stored_bytes && out.size() == record.raw_bytes);
+  const auto payload = stored.first(record.stored_bytes);
+  SHOAL_RETURN_IF_ERROR(check_payload(*this, record, payload));
+  if (record.codec != PageCodec::kRaw) return decode(*this, record, payload, out);
+  std::copy(payload.begin(), payload.end(), out.begin());
+  return {};
+}
+
 const TableRange* PageFile::find_table(TableId table) const {
   const auto found =
       std::find_if(tables_.begin(), tables_.end(), [&](const TableRange& range) { return range.table == table; });

@@ -47,6 +47,12 @@ struct PageRecord {       // 40 bytes, as stored in the directory
 };
 static_assert(sizeof(PageRecord) == 40);
 
+/// Where the stored bytes of a page lie: whole blocks.
+struct StoredRange {
+  uint64_t offset = 0;
+  uint64_t bytes = 0;
+};
+
 class PageFileWriter {
  public:
   /// Bytes go to a temporary file beside `path` until finish(). Fails with: kStorage.
@@ -92,6 +98,11 @@ class PageFile {
   /// Reads, verifies and decodes one page into `out` (exactly record(id).raw_bytes long). Sets
   /// `*read_bytes` to the bytes asked of the disk (whole 4 KiB blocks). Fails with: kStorage, kCorrupt.
   Status read_page(PageId id, std::span<std::byte> out, uint64_t* read_bytes) const;
+  /// The two halves of read_page(), for reads that go on by themselves: the bytes to read, and what makes a page of
+  /// them (`stored` is as long as the range). Fails with: kCorrupt.
+  StoredRange stored_range(PageId id) const;
+  Status decode_page(PageId id, std::span<const std::byte> stored, std::span<std::byte> out) const;
+  ReadableFile& file() const { return *file_; }
   /// The whole of a table; empty when it was stored empty. Fails with: kCorrupt when it is absent or larger
   /// than `limit_bytes`.
   Result<std::vector<std::byte>> read_table(TableId table, uint64_t limit_bytes) const;

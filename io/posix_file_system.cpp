@@ -59,6 +59,7 @@ class PosixReadableFile final : public ReadableFile {
 
   uint64_t size_bytes() const override { return size_bytes_; }
   const std::string& path() const override { return path_; }
+  int descriptor() const override { return fd_.get(); }
 
   Status read_at(uint64_t offset, std::span<std::byte> out) override {
     const uint64_t begin = offset;

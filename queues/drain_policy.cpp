@@ -10,10 +10,10 @@ std::span<const std::string_view> drain_policy_names() {
 }
 
 std::unique_ptr<DrainPolicy> make_drain_policy(std::string_view name, const PolicyOptions& options) {
-  if (name == "fullest") return make_fullest_policy();
-  if (name == "sweep") return make_sweep_policy();
-  if (name == "resident-first") return make_resident_first_policy(options.minimum_batch);
-  if (name == "full") return make_full_policy(options.queue_capacity);
+  if (name == "fullest") return make_fullest_policy(options);
+  if (name == "sweep") return make_sweep_policy(options);
+  if (name == "resident-first") return make_resident_first_policy(options);
+  if (name == "full") return make_full_policy(options);
   return nullptr;
 }
 

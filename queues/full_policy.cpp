@@ -1,36 +1,37 @@
 // full: a queue is flushed when its capacity is reached; what is left in partly filled queues when no new rays can
 // come is flushed fullest first.
-#include "queues/drain_policy.h"
-
-#include <algorithm>
+#include "queues/most_waiting.h"
 
 namespace shoal {
 namespace {
 
 class FullPolicy final : public DrainPolicy {
  public:
-  /// At least 1: an empty queue must never count as full, or it would be chosen for ever.
-  explicit FullPolicy(uint32_t queue_capacity) : queue_capacity_(std::max(queue_capacity, 1u)) {}
+  explicit FullPolicy(const PolicyOptions& options) : options_(options) {}
 
-  TreeletId choose(const WaitingView& view, bool more_coming) override {
-    TreeletId best = kNoIndex;
-    uint32_t most = 0;
-    for (TreeletId id = 0; id < view.treelet_count(); ++id) {
-      const uint32_t waiting = view.waiting(id);
-      if (waiting >= queue_capacity_) return id;
-      if (waiting > most) most = waiting, best = id;
+  void decide(std::span<const WaitingTreelet> work, bool more_coming, Decision& decision) override {
+    flushed_.clear();
+    const size_t limit = std::max(options_.drains, 1u);
+    for (const WaitingTreelet& w : work) {
+      if (w.waiting >= options_.queue_capacity && flushed_.size() < limit) flushed_.push_back(w);
     }
-    return more_coming ? kNoIndex : best;
+    if (flushed_.empty() && !more_coming) {
+      flushed_.assign(work.begin(), work.end());
+      keep_most_waiting(flushed_, 1);
+    }
+    for (const WaitingTreelet& w : flushed_) decision.drain.push_back(w.treelet);
+    load_what_is_drained(flushed_, options_.loads, decision);
   }
 
  private:
-  uint32_t queue_capacity_;
+  PolicyOptions options_;
+  std::vector<WaitingTreelet> flushed_;
 };
 
 }  // namespace
 
-std::unique_ptr<DrainPolicy> make_full_policy(uint32_t queue_capacity) {
-  return std::make_unique<FullPolicy>(queue_capacity);
+std::unique_ptr<DrainPolicy> make_full_policy(const PolicyOptions& options) {
+  return std::make_unique<FullPolicy>(options);
 }
 
 }  // namespace shoal

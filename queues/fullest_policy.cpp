@@ -1,24 +1,29 @@
-// fullest: the treelet that most rays and paths wait for; ties go to the smaller id.
-#include "queues/drain_policy.h"
+// fullest: the treelets that most rays and paths wait for, in memory or not; ties go to the smaller id.
+#include "queues/most_waiting.h"
 
 namespace shoal {
 namespace {
 
 class FullestPolicy final : public DrainPolicy {
  public:
-  TreeletId choose(const WaitingView& view, bool /*more_coming*/) override {
-    TreeletId best = kNoIndex;
-    uint32_t most = 0;
-    for (TreeletId id = 0; id < view.treelet_count(); ++id) {
-      const uint32_t waiting = view.waiting(id);
-      if (waiting > most) most = waiting, best = id;
-    }
-    return best;
+  explicit FullestPolicy(const PolicyOptions& options) : options_(options) {}
+
+  void decide(std::span<const WaitingTreelet> work, bool /*more_coming*/, Decision& decision) override {
+    most_.assign(work.begin(), work.end());
+    keep_most_waiting(most_, std::max(options_.drains, 1u));
+    for (const WaitingTreelet& w : most_) decision.drain.push_back(w.treelet);
+    load_what_is_drained(most_, options_.loads, decision);
   }
+
+ private:
+  PolicyOptions options_;
+  std::vector<WaitingTreelet> most_;
 };
 
 }  // namespace
 
-std::unique_ptr<DrainPolicy> make_fullest_policy() { return std::make_unique<FullestPolicy>(); }
+std::unique_ptr<DrainPolicy> make_fullest_policy(const PolicyOptions& options) {
+  return std::make_unique<FullestPolicy>(options);
+}
 
 }  // namespace shoal

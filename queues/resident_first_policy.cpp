@@ -1,36 +1,56 @@
-// resident-first: the fullest treelet that is in memory, unless what waits there is less than a minimum batch while a
-// treelet on disk has more; then the one that most wait for is loaded. Fewest bytes read of
-// the policies measured in a prototype (docs/decisions/0008).
-#include <algorithm>
-
-#include "queues/drain_policy.h"
+// resident-first: the fullest treelets that are in memory, but none with less than a minimum batch while fuller ones
+// wait on disk; those that most wait for are read ahead, once little is left to trace in memory: what is loaded later
+// is loaded for more rays. Fewest bytes read of the policies measured (docs/decisions/0008, 0013).
+#include "queues/most_waiting.h"
 
 namespace shoal {
 namespace {
 
 class ResidentFirstPolicy final : public DrainPolicy {
  public:
-  explicit ResidentFirstPolicy(uint32_t minimum_batch) : minimum_batch_(std::max(minimum_batch, 1u)) {}
+  explicit ResidentFirstPolicy(const PolicyOptions& options) : options_(options) {}
 
-  TreeletId choose(const WaitingView& view, bool /*more_coming*/) override {
-    TreeletId in_memory = kNoIndex, anywhere = kNoIndex;
-    uint32_t most_in_memory = 0, most = 0;
-    for (TreeletId id = 0; id < view.treelet_count(); ++id) {
-      const uint32_t waiting = view.waiting(id);
-      if (waiting > most) most = waiting, anywhere = id;
-      if (waiting > most_in_memory && view.resident(id)) most_in_memory = waiting, in_memory = id;
+  void decide(std::span<const WaitingTreelet> work, bool /*more_coming*/, Decision& decision) override {
+    in_memory_.clear(), on_disk_.clear();
+    uint64_t rays_in_memory = 0;
+    uint32_t most_in_memory = 0, most_on_disk = 0;
+    for (const WaitingTreelet& w : work) {
+      (w.resident ? in_memory_ : on_disk_).push_back(w);
+      uint32_t& most = w.resident ? most_in_memory : most_on_disk;
+      most = std::max(most, w.waiting);
+      if (w.resident) rays_in_memory += w.waiting;
     }
-    return most_in_memory >= minimum_batch_ ? in_memory : anywhere;
+    // With something on its way a small batch in memory is better than waiting; without, it is what a load would make
+    // larger.
+    const bool small_batches = options_.loads > 0 || most_in_memory >= most_on_disk;
+    if (!small_batches) std::erase_if(in_memory_, [&](const auto& w) { return w.waiting < options_.minimum_batch; });
+    keep_most_waiting(in_memory_, std::max(options_.drains, 1u));
+    // What is small waits while something larger is there to do.
+    while (in_memory_.size() > 1 && in_memory_.back().waiting < options_.minimum_batch) in_memory_.pop_back();
+    for (const WaitingTreelet& w : in_memory_) decision.drain.push_back(w.treelet);
+    load_most_wanted(decision);
+    decision.rays_in_memory = rays_in_memory;
+    decision.load_below_rays = options_.rays_ahead;
   }
 
  private:
-  uint32_t minimum_batch_;
+  void load_most_wanted(Decision& decision) {
+    keep_most_waiting(on_disk_, std::max(options_.loads, 1u));
+    if (options_.loads > 0) {
+      for (const WaitingTreelet& w : on_disk_) decision.load.push_back(w.treelet);
+    } else if (decision.drain.empty() && !on_disk_.empty()) {
+      decision.drain.push_back(on_disk_.front().treelet);
+    }
+  }
+
+  PolicyOptions options_;
+  std::vector<WaitingTreelet> in_memory_, on_disk_;
 };
 
 }  // namespace
 
-std::unique_ptr<DrainPolicy> make_resident_first_policy(uint32_t minimum_batch) {
-  return std::make_unique<ResidentFirstPolicy>(minimum_batch);
+std::unique_ptr<DrainPolicy> make_resident_first_policy(const PolicyOptions& options) {
+  return std::make_unique<ResidentFirstPolicy>(options);
 }
 
 }  // namespace shoal

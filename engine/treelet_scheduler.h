@@ -1,0 +1,77 @@
+// Which treelet a thread takes in hand next, and what is read from disk meanwhile: serves the decisions of a drain
+// policy one by one, keeps the disk busy with what they want, and hands out treelets as they arrive.
+// Called by engine/render_queued.
+//
+// Properties and assumptions
+//   threads    any number; one lock a choice. A decision looks at every treelet and is good for many choices.
+//   progress   when nothing is resident, nothing on its way and no room can be made, the most wanted treelet is given
+//              out all the same: who takes it in hand reads it, and that always finds room (io/page_cache.h).
+//   staleness  a treelet of a decision may have been drained or evicted since: it is skipped, or read again.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "engine/queued_paths.h"
+#include "engine/scene.h"
+#include "io/page_cache.h"
+#include "queues/drain_policy.h"
+
+namespace shoal {
+
+/// For every page the treelet it belongs to, kNoIndex for texture tiles and tables.
+std::vector<TreeletId> treelet_of_pages(const Scene& scene);
+
+/// What usually waits for a treelet when it is drained: the mean of the drains, the last ones weighing most.
+class UsualBatches {
+ public:
+  explicit UsualBatches(size_t treelets) : batches_(treelets) {}
+  uint32_t of(TreeletId treelet) const { return batches_[treelet].load(std::memory_order_relaxed); }
+  void note(TreeletId treelet, uint32_t drained) {
+    batches_[treelet].store((of(treelet) + drained) / 2, std::memory_order_relaxed);
+  }
+
+ private:
+  std::vector<std::atomic<uint32_t>> batches_;
+};
+
+class TreeletScheduler {
+ public:
+  TreeletScheduler(const Scene& scene, const QueuedPaths& paths, PageCache& cache, DrainPolicy& policy,
+                   std::span<const TreeletId> page_treelets)
+      : scene_(scene), paths_(paths), cache_(cache), policy_(policy), page_treelets_(page_treelets) {}
+
+  /// The treelet to drain next, or kNoIndex: nothing is worth it yet, or what is wanted is still on its way.
+  TreeletId choose(bool more_coming, CacheCounters& counters);
+
+  /// Geometry and attributes are there: draining it reads nothing.
+  bool resident(TreeletId treelet) const {
+    const TreeletPages& pages = scene_.treelets[treelet];
+    return cache_.resident(pages.geometry) && (pages.attributes == kNoPage || cache_.resident(pages.attributes));
+  }
+
+ private:
+  TreeletId take_ready();
+  void take_loaded();
+  void decide(bool more_coming);
+  void start_loads(CacheCounters& counters);
+  Prefetch start_load(TreeletId treelet, CacheCounters& counters);
+
+  const Scene& scene_;
+  const QueuedPaths& paths_;
+  PageCache& cache_;
+  DrainPolicy& policy_;
+  std::span<const TreeletId> page_treelets_;
+
+  std::mutex mutex_;
+  Decision decision_;
+  size_t next_drain_ = 0, next_load_ = 0;
+  uint64_t rays_in_memory_ = 0;  ///< left of those that the decision saw
+  double decided_seconds_ = 0;
+  std::vector<WaitingTreelet> work_;
+  std::vector<PageId> loaded_;
+};
+
+}  // namespace shoal
