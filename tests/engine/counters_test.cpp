@@ -33,7 +33,7 @@ TEST(Counters, EachBrokenIdentityIsFoundAndNamed) {
     EXPECT_NE(status.error().message.find(name), std::string::npos) << status.error().message;
   };
   expect_broken([](RenderCounters& c) { ++c.page_hits_count; }, "page_requests_count");
-  expect_broken([](RenderCounters& c) { ++c.treelet_loads_count; }, "page_misses_count");
+  expect_broken([](RenderCounters& c) { ++c.treelet_loads_count; }, "misses + prefetches");
   expect_broken([](RenderCounters& c) { ++c.rays[2][3].rays_queued_count; }, "rays_queued_count");
   expect_broken([](RenderCounters& c) { ++c.rays[1][1].rays_traced_count; }, "rays_traced_count");
   expect_broken([](RenderCounters& c) { --c.rays[0][0].ray_misses_count; }, "rays_finished_count");

@@ -25,6 +25,7 @@ struct Variation {
   uint32_t more_levels = 32;
   const char* policy = "resident-first";
   uint32_t queue_capacity = 4096;
+  PagingOptions paging = {};
 };
 
 const Variation kVariations[] = {
@@ -42,6 +43,13 @@ const Variation kVariations[] = {
     {.name = "treelets of 4 KiB", .treelet_bytes = 4u << 10, .rays_in_flight = 20000},
     {.name = "treelets of 4 KiB, smallest everything", .treelet_bytes = 4u << 10, .threads = 1, .rays_in_flight = 64,
      .smallest_cache = true, .more_levels = 0},
+    {.name = "every page read when it is needed", .rays_in_flight = 5000, .smallest_cache = true,
+     .paging = {.read_depth = 0}},
+    {.name = "smallest cache, least recent leaves", .smallest_cache = true, .paging = {.eviction = "least-recent"}},
+    {.name = "read by threads, three decode", .threads = 3, .smallest_cache = true,
+     .paging = {.read_depth = 2, .loader_threads = 3, .backend = ReadBackend::kThreads, .eviction = "least-demand"}},
+    {.name = "treelets of 4 KiB, sweep, smallest cache", .treelet_bytes = 4u << 10, .rays_in_flight = 5000,
+     .smallest_cache = true, .policy = "sweep"},
     {.name = "treelets of 4 MiB", .treelet_bytes = 4u << 20},
     {.name = "treelets of 64 KiB, depth-first", .treelet_bytes = 64u << 10, .order = Order::kDepthFirst},
 };
@@ -85,6 +93,7 @@ class RenderOrders : public ::testing::Test {
     execution.rays_in_flight = v.rays_in_flight;
     execution.policy = v.policy;
     execution.policy_options.queue_capacity = v.queue_capacity;
+    execution.paging = v.paging;
     if (v.smallest_cache) {
       execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
     }

@@ -39,20 +39,6 @@ void expect_page(const PagePin& pin, PageId id, uint32_t bytes) {
   EXPECT_EQ(std::memcmp(pin.bytes().data() + bytes, zeros, 64), 0) << "page " << id;
 }
 
-void add(CacheCounters& sum, const CacheCounters& c) {
-  sum.page_requests_count += c.page_requests_count;
-  sum.page_hits_count += c.page_hits_count;
-  sum.page_misses_count += c.page_misses_count;
-  sum.page_evictions_count += c.page_evictions_count;
-  sum.disk_reads_count += c.disk_reads_count;
-  sum.disk_read_bytes += c.disk_read_bytes;
-  sum.decoded_bytes += c.decoded_bytes;
-  sum.treelet_loads_count += c.treelet_loads_count;
-  sum.treelet_load_bytes += c.treelet_load_bytes;
-  sum.attribute_loads_count += c.attribute_loads_count;
-  sum.texture_loads_count += c.texture_loads_count;
-}
-
 TEST(PageCache, GivesThePagesAndCountsThem) {
   MemoryFileSystem fs;
   const std::vector<PageSpec> pages = {{PageKind::kTreelet, 100000}, {PageKind::kAttributes, 1},
@@ -198,7 +184,7 @@ TEST(PageCache, ReadsAPageOnceForManyThreads) {
   }
   for (auto& thread : threads) thread.join();
   CacheCounters sum;
-  for (const auto& c : counters) add(sum, c);
+  for (const auto& c : counters) sum.add(c);
   EXPECT_EQ(sum.page_misses_count, 8u);
   EXPECT_EQ(sum.page_hits_count, 8u * (kThreads - 1));
   EXPECT_EQ(fs.calls(), 8u);
@@ -346,7 +332,7 @@ void run_many_threads(unsigned threads, uint64_t extra_bytes, bool with_work) {
   for (unsigned t = 0; t < threads; ++t) running.emplace_back(visit, t);
   for (auto& thread : running) thread.join();
   CacheCounters sum;
-  for (const auto& c : counters) add(sum, c);
+  for (const auto& c : counters) sum.add(c);
   EXPECT_FALSE(over);
   EXPECT_LE(cache.peak_resident_bytes(), cache.capacity_bytes());
   EXPECT_EQ(sum.page_requests_count, sum.page_hits_count + sum.page_misses_count);
