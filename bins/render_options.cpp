@@ -176,8 +176,7 @@ void RenderArguments::declare(CLI::App& app) {
       ->check(CLI::Range(0, 1024))
       ->group("For experiments");
   app.add_option("--rays-ahead", execution.policy_options.rays_ahead,
-                 "policy resident-first: reads ahead once fewer rays wait in memory")
-      ->capture_default_str()
+                 "policy resident-first: reads ahead once fewer rays wait in memory (default: from the plan)")
       ->group("For experiments");
   add_choice(app, "--read-backend", execution.paging.backend, kBackends, ": how pages are read ahead")
       ->type_name("WAY")

@@ -47,9 +47,14 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
 /// Larger scenes decide for longer: a decision looks at every treelet.
 constexpr uint32_t kTreeletsADrain = 256;
 
-PolicyOptions scaled_policy(const ExecutionOptions& execution, uint32_t treelets) {
+/// Of the paths in flight, the part whose rays may wait in memory while more is read, and the least of it. Small values
+/// read less and drain smaller batches, which cost more time (docs/decisions/0013).
+constexpr uint32_t kPathsAheadShare = 4, kLeastRaysAhead = 16384;
+
+PolicyOptions scaled_policy(const ExecutionOptions& execution, uint32_t treelets, uint32_t paths_in_flight) {
   PolicyOptions options = execution.policy_options;
   options.drains = std::max(options.drains, treelets / kTreeletsADrain);
+  if (options.rays_ahead == 0) options.rays_ahead = std::max(kLeastRaysAhead, paths_in_flight / kPathsAheadShare);
   options.loads = execution.paging.read_depth == 0 ? 0 : std::max(options.drains, 2 * execution.paging.read_depth);
   return options;
 }
@@ -92,7 +97,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.start_seconds = start;
   if (queued) {
     const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
-        execution.policy, scaled_policy(execution, static_cast<uint32_t>(scene.treelets.size())));
+        execution.policy, scaled_policy(execution, static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight));
     TreeletScheduler scheduler(scene, *paths, cache, *policy, page_treelets);
     render_queued(context, *paths, scheduler, batches);
   } else {

@@ -85,9 +85,8 @@ void TreeletScheduler::start_loads(CacheCounters& counters) {
 
 Prefetch TreeletScheduler::start_load(TreeletId treelet, CacheCounters& counters) {
   const TreeletPages& pages = scene_.treelets[treelet];
-  const Prefetch geometry = cache_.prefetch(pages.geometry, counters);
-  if (geometry == Prefetch::kBusy || geometry == Prefetch::kNoRoom || pages.attributes == kNoPage) return geometry;
-  return cache_.prefetch(pages.attributes, counters);
+  return pages.attributes == kNoPage ? cache_.prefetch(pages.geometry, counters)
+                                     : cache_.prefetch_pair(pages.geometry, counters);
 }
 
 }  // namespace shoal

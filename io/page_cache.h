@@ -107,6 +107,8 @@ class PageCache {
   Result<PagePin> pin(PageId page, CacheCounters& counters);
   /// Starts reading a page that will be wanted. A read that fails is kept (failure()): who asked may never pin it.
   Prefetch prefetch(PageId page, CacheCounters& counters);
+  /// The same for a page and the one after it, with one read where both are wanted and lie side by side.
+  Prefetch prefetch_pair(PageId page, CacheCounters& counters);
   /// Moves the pages that prefetches brought since the last call to `pages` (cleared first).
   void take_loaded(std::vector<PageId>& pages);
   /// Prefetches under way.

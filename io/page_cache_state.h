@@ -30,6 +30,7 @@ struct alignas(32) PageSlot {
   std::atomic<uint64_t> last_use{0};  // State::tick: even for a load, odd for a hit after it
   std::byte* data = nullptr;
   uint32_t place = 0;  // in State::residents
+  std::atomic<bool> checked{false};  // the page passed PageCheck before
 };
 static_assert(sizeof(PageSlot) == 32);
 inline constexpr uint32_t kResident = 1u << 31;
@@ -68,7 +69,10 @@ struct PageCache::State {
   bool evict_one(CacheCounters& counters, uint64_t below_work = ~0ull);
   uint64_t rank_of(PageId page) const;
   uint64_t work_of(PageId page) const { return waiting ? waiting(page).waiting : 0; }
-  void finish_prefetch(PageId page, std::byte* data, Status status);
+  /// Room for the page and its entry among the loads; nullptr (with the reason) when it is not to be read.
+  std::byte* begin_prefetch(PageId page, CacheCounters& counters, Prefetch& answer);
+  void abandon_prefetch(PageId page, std::byte* data);
+  void finish_prefetch(PageId page, std::byte* data, Status status, PageLoader::ReadShare share);
   bool try_evict(PageId page, CacheCounters& counters);
   void rank_candidates();
   void publish(PageId page, std::byte* data, uint32_t pins);

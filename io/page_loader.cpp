@@ -22,10 +22,13 @@ std::unique_ptr<AsyncReader> make_reader(const PageFile& file, const PagingOptio
   return make_thread_reader(options.read_depth, std::min(options.read_depth, kReadThreads));
 }
 
-uint64_t largest_stored_bytes(const PageFile& file) {
-  uint64_t largest = kBlockBytes;
+/// Of a page and the one after it.
+uint64_t largest_pair_bytes(const PageFile& file) {
+  uint64_t largest = kBlockBytes, before = 0;
   for (const PageRecord& record : file.records()) {
-    if (record.kind != PageKind::kTable) largest = std::max(largest, align_up(record.stored_bytes, kBlockBytes));
+    const uint64_t bytes = record.kind == PageKind::kTable ? 0 : align_up(record.stored_bytes, kBlockBytes);
+    largest = std::max(largest, before + bytes);
+    before = bytes;
   }
   return largest;
 }
@@ -36,11 +39,12 @@ struct PageLoader::State {
   struct Slot {
     PageId page = kNoPage;
     std::byte* out = nullptr;
+    std::byte* next_out = nullptr;
     std::span<std::byte> stored;
   };
 
   State(const PageFile& page_file, const PagingOptions& options, Finished done)
-      : file(page_file), finished(std::move(done)), slot_bytes(largest_stored_bytes(page_file)), slots(options.read_depth) {
+      : file(page_file), finished(std::move(done)), slot_bytes(largest_pair_bytes(page_file)), slots(options.read_depth) {
     for (uint32_t i = options.read_depth; i-- > 0;) free_slots.push_back(i);
     reader = make_reader(file, options);
   }
@@ -49,18 +53,27 @@ struct PageLoader::State {
   void serve() {
     while (auto completion = reader->wait()) {
       const Slot slot = slots[completion->tag];
-      Status status = std::move(completion->status);
-      if (status.ok()) {
-        status = file.decode_page(slot.page, slot.stored, {slot.out, file.record(slot.page).raw_bytes});
-      }
+      const Status& read = completion->status;
+      const uint64_t first_bytes = file.stored_range(slot.page).bytes;
+      Status first = decode(read, slot.page, slot.stored.first(first_bytes), slot.out);
+      Status next;
+      if (slot.next_out != nullptr) next = decode(read, slot.page + 1, slot.stored.subspan(first_bytes), slot.next_out);
       {
         const std::lock_guard lock(mutex);
         free_slots.push_back(completion->tag);
       }
-      finished(slot.page, slot.out, std::move(status));
+      finished(slot.page, slot.out, std::move(first), {first_bytes, 1});
+      if (slot.next_out != nullptr) {
+        finished(slot.page + 1, slot.next_out, std::move(next), {slot.stored.size() - first_bytes, 0});
+      }
       under_way.fetch_sub(1);
       under_way.notify_all();
     }
+  }
+
+  Status decode(const Status& read, PageId page, std::span<const std::byte> stored, std::byte* out) const {
+    if (!read.ok()) return read;
+    return file.decode_page(page, stored, {out, file.record(page).raw_bytes});
   }
 
   const PageFile& file;
@@ -94,7 +107,7 @@ PageLoader::~PageLoader() {
   for (std::thread& thread : s.threads) thread.join();
 }
 
-bool PageLoader::try_start(PageId page, std::byte* out) {
+bool PageLoader::try_start(PageId page, std::byte* out, std::byte* next_out) {
   State& s = *state_;
   uint32_t tag = 0;
   {
@@ -106,9 +119,16 @@ bool PageLoader::try_start(PageId page, std::byte* out) {
   s.under_way.fetch_add(1);
   State::Slot& slot = s.slots[tag];
   const StoredRange range = s.file.stored_range(page);
+  uint64_t bytes = range.bytes;
+  if (next_out != nullptr) {
+    const StoredRange next = s.file.stored_range(page + 1);
+    SHOAL_CHECK(next.offset == range.offset + range.bytes);
+    bytes += next.bytes;
+  }
   slot.page = page;
   slot.out = out;
-  slot.stored = {slot.stored.data(), range.bytes};
+  slot.next_out = next_out;
+  slot.stored = {slot.stored.data(), bytes};
   s.reader->submit({&s.file.file(), range.offset, slot.stored, tag});
   return true;
 }
@@ -127,7 +147,7 @@ unsigned PageLoader::under_way() const { return state_->under_way.load(); }
 const char* PageLoader::backend() const { return state_->reader->name(); }
 
 uint64_t PageLoader::buffer_bytes(const PageFile& file, const PagingOptions& options) {
-  return options.read_depth == 0 ? 0 : largest_stored_bytes(file) * options.read_depth + (1u << 20);
+  return options.read_depth == 0 ? 0 : largest_pair_bytes(file) * options.read_depth + (1u << 20);
 }
 
 }  // namespace shoal

@@ -2,8 +2,9 @@
 // decode what has come. Used by the page cache only.
 //
 // Properties and assumptions
-//   capacity   PagingOptions::read_depth pages at once, each with a buffer for its stored bytes.
-//   ownership  `out` belongs to the loader from try_start() until `finished` is called for the page, exactly once.
+//   capacity   PagingOptions::read_depth reads at once, each of one page or two neighbours, with a buffer for their
+//              stored bytes.
+//   ownership  `out` belongs to the loader from try_start() until `finished` is called for its page, exactly once.
 //   threads    try_start() from any thread; `finished` is called from a loader thread, with no lock held.
 //   when full  try_start() says no.
 //   the end    the destructor waits for what is under way.
@@ -35,14 +36,20 @@ struct PagingOptions {
 
 class PageLoader {
  public:
-  using Finished = std::function<void(PageId page, std::byte* out, Status status)>;
+  /// What was asked of the disk for a page: its stored bytes, and whether its neighbour came with the same read.
+  struct ReadShare {
+    uint64_t bytes = 0;
+    uint32_t reads = 0;  ///< 1; 0 for the second page of a read
+  };
+  using Finished = std::function<void(PageId page, std::byte* out, Status status, ReadShare share)>;
 
   /// Requires: options.read_depth > 0.
   PageLoader(const PageFile& file, const PagingOptions& options, Finished finished);
   ~PageLoader();
 
-  /// Starts reading `page` into `out` (raw_bytes long). False when read_depth pages are under way.
-  bool try_start(PageId page, std::byte* out);
+  /// Starts reading `page` into `out` (raw_bytes long) and, with one read, the page after it into `next_out` unless that
+  /// is nullptr. False when read_depth reads are under way. Requires, with next_out: the two lie side by side.
+  bool try_start(PageId page, std::byte* out, std::byte* next_out = nullptr);
   bool full() const;
   /// Waits until nothing is under way.
   void finish();

@@ -3,39 +3,75 @@
 
 namespace shoal {
 
+/// Requires the lock.
+std::byte* PageCache::State::begin_prefetch(PageId page, CacheCounters& counters, Prefetch& answer) {
+  answer = Prefetch::kNotNeeded;
+  if ((slots[page].state.load() & kResident) != 0 || loads.contains(page)) return nullptr;
+  std::byte* data = try_make_room(page_bytes(page), work_of(page), counters);
+  answer = data == nullptr ? Prefetch::kNoRoom : Prefetch::kStarted;
+  if (data != nullptr) loads.emplace(page, std::make_shared<PageLoad>());
+  return data;
+}
+
+/// Requires the lock. Another thread took the last place among the reads meanwhile.
+void PageCache::State::abandon_prefetch(PageId page, std::byte* data) {
+  const std::shared_ptr<PageLoad> load = loads.at(page);
+  load->abandoned = load->done = true;
+  loads.erase(page);
+  used_bytes -= PageBuffers::charge_bytes(page_bytes(page));
+  buffers.keep(data, page_bytes(page));
+  loaded.notify_all();
+  unpinned.notify_all();
+}
+
 Prefetch PageCache::prefetch(PageId page, CacheCounters& counters) {
   State& s = *state_;
   SHOAL_CHECK(page < s.file.page_count());
   if (resident(page)) return Prefetch::kNotNeeded;
   if (s.loader == nullptr || s.loader->full()) return Prefetch::kBusy;
+  Prefetch answer;
   std::byte* data = nullptr;
   {
     const std::lock_guard lock(s.mutex);
-    if ((s.slots[page].state.load() & kResident) != 0 || s.loads.contains(page)) return Prefetch::kNotNeeded;
-    data = s.try_make_room(s.page_bytes(page), s.work_of(page), counters);
-    if (data == nullptr) return Prefetch::kNoRoom;
-    s.loads.emplace(page, std::make_shared<PageLoad>());
+    data = s.begin_prefetch(page, counters, answer);
   }
-  if (s.loader->try_start(page, data)) return Prefetch::kStarted;
-  // Another thread took the last place meanwhile.
+  if (data == nullptr || s.loader->try_start(page, data)) return answer;
   const std::lock_guard lock(s.mutex);
-  const std::shared_ptr<PageLoad> load = s.loads.at(page);
-  load->error = Error{ErrorCode::kInternal, "not read after all"};
-  load->abandoned = load->done = true;
-  s.loads.erase(page);
-  s.used_bytes -= PageBuffers::charge_bytes(s.page_bytes(page));
-  s.buffers.keep(data, s.page_bytes(page));
-  s.loaded.notify_all();
-  s.unpinned.notify_all();
+  s.abandon_prefetch(page, data);
+  return Prefetch::kBusy;
+}
+
+Prefetch PageCache::prefetch_pair(PageId page, CacheCounters& counters) {
+  State& s = *state_;
+  SHOAL_CHECK(page + 1 < s.file.page_count());
+  const StoredRange first = s.file.stored_range(page), next = s.file.stored_range(page + 1);
+  if (resident(page) || resident(page + 1) || first.offset + first.bytes != next.offset) {
+    const Prefetch answer = prefetch(page, counters);
+    if (answer == Prefetch::kBusy || answer == Prefetch::kNoRoom) return answer;
+    return prefetch(page + 1, counters);
+  }
+  if (s.loader == nullptr || s.loader->full()) return Prefetch::kBusy;
+  Prefetch answer, next_answer = Prefetch::kNotNeeded;
+  std::byte *data = nullptr, *next_data = nullptr;
+  {
+    const std::lock_guard lock(s.mutex);
+    data = s.begin_prefetch(page, counters, answer);
+    if (data != nullptr) next_data = s.begin_prefetch(page + 1, counters, next_answer);
+  }
+  if (data == nullptr || s.loader->try_start(page, data, next_data)) return answer;
+  const std::lock_guard lock(s.mutex);
+  s.abandon_prefetch(page, data);
+  if (next_data != nullptr) s.abandon_prefetch(page + 1, next_data);
   return Prefetch::kBusy;
 }
 
 /// A loader thread brings a page, or an error.
-void PageCache::State::finish_prefetch(PageId page, std::byte* data, Status status) {
+void PageCache::State::finish_prefetch(PageId page, std::byte* data, Status status,
+                                       PageLoader::ReadShare share) {
   CacheCounters counters;
   counters.page_prefetches_count = 1;
-  counters.disk_reads_count = 1;
-  counters.disk_read_bytes = file.stored_range(page).bytes;
+  counters.disk_reads_count = share.reads;
+  counters.disk_read_bytes = share.bytes;
   if (status.ok()) status = check_read(page, data, counters);
   background_bytes.fetch_add(counters.disk_read_bytes, std::memory_order_relaxed);
   {

@@ -25,8 +25,9 @@ struct PolicyOptions {
   uint32_t minimum_batch = 64;     ///< resident-first: smaller queues wait while larger ones exist
   uint32_t drains = 32;            ///< treelets to drain of a decision, at most; at least 1
   uint32_t loads = 64;             ///< treelets to load of a decision, at most; 0: nothing can be read ahead
-  /// resident-first: while so many rays wait in memory nothing more is read ahead, so that more gather first.
-  uint32_t rays_ahead = 16384;
+  /// resident-first: while so many rays wait in memory nothing more is read ahead, so that more gather first. 0: from
+  /// the rays in flight (engine/render.cpp).
+  uint32_t rays_ahead = 0;
 };
 
 struct Decision {

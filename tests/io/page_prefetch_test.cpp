@@ -59,6 +59,43 @@ TEST_F(PrefetchingCache, APageThatWasBroughtIsAHitWithTheRightBytes) {
   EXPECT_GT(background.disk_read_bytes, 0u);
 }
 
+TEST_F(PrefetchingCache, BringsTwoNeighboursWithOneRead) {
+  open(6, 6);
+  EXPECT_EQ(cache->prefetch_pair(2, counters), Prefetch::kStarted);
+  cache->finish_loads();
+  for (const PageId id : {2u, 3u}) {
+    const auto pin = cache->pin(id, counters);
+    ASSERT_TRUE(pin.ok());
+    EXPECT_EQ(std::memcmp(pin.value().bytes().data(), page_bytes(id, 4096).data(), 4096), 0);
+  }
+  EXPECT_EQ(counters.page_hits_count, 2u);
+  EXPECT_EQ(cache->background_counters().disk_reads_count, 1u);
+  EXPECT_EQ(cache->background_counters().page_prefetches_count, 2u);
+  // One of the two is there already: only the other is read.
+  EXPECT_EQ(bring(5), Prefetch::kStarted);
+  EXPECT_EQ(cache->prefetch_pair(4, counters), Prefetch::kNotNeeded);
+  cache->finish_loads();
+  EXPECT_TRUE(cache->resident(4));
+  EXPECT_EQ(cache->background_counters().disk_reads_count, 3u);
+}
+
+TEST_F(PrefetchingCache, ADamagedNeighbourHarmsOnlyItself) {
+  open(4, 4);
+  std::vector<std::byte> bytes(file->file_bytes());
+  ASSERT_TRUE(fs.open("a", ReadMode::kBuffered).value()->read_at(0, bytes).ok());
+  bytes[file->stored_range(2).offset] ^= std::byte{1};
+  ASSERT_TRUE(write_whole_file(fs, "b", bytes).ok());
+  const auto damaged = PageFile::open(fs, "b", ReadMode::kBuffered);
+  ASSERT_TRUE(damaged.ok());
+  PageCache other(*damaged.value(), 1u << 20, PageCheck(), [](PageId) { return PageDemand(); });
+  EXPECT_EQ(other.prefetch_pair(1, counters), Prefetch::kStarted);
+  other.finish_loads();
+  EXPECT_TRUE(other.resident(1));
+  EXPECT_FALSE(other.resident(2));
+  ASSERT_FALSE(other.failure().ok());
+  EXPECT_EQ(other.failure().error().code, ErrorCode::kCorrupt);
+}
+
 TEST_F(PrefetchingCache, WhatIsResidentOrOnItsWayIsNotReadAgain) {
   open(2, 2);
   EXPECT_EQ(bring(0), Prefetch::kStarted);
