@@ -168,7 +168,7 @@ void RenderArguments::declare(CLI::App& app) {
   static const std::map<std::string, ReadBackend> kBackends{
       {"auto", ReadBackend::kAuto}, {"io_uring", ReadBackend::kUring}, {"threads", ReadBackend::kThreads}};
   app.add_option("--eviction", execution.paging.eviction,
-                 "which page leaves first: least-waiting, least-demand, least-recent")
+                 "which page leaves first: least-demand, least-waiting, least-recent")
       ->capture_default_str()
       ->group("For experiments");
   app.add_option("--read-depth", execution.paging.read_depth, "pages read ahead at once; 0: read when needed")

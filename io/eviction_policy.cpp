@@ -5,7 +5,7 @@
 namespace shoal {
 
 std::span<const std::string_view> eviction_policy_names() {
-  static constexpr std::array<std::string_view, 3> kNames{"least-waiting", "least-demand", "least-recent"};
+  static constexpr std::array<std::string_view, 3> kNames{"least-demand", "least-waiting", "least-recent"};
   return kNames;
 }
 

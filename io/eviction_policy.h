@@ -28,9 +28,11 @@ class EvictionPolicy {
   virtual ~EvictionPolicy() = default;
   /// The page with the smallest rank goes first; equal ones by least recent use. `last_use` grows with every load.
   virtual uint64_t rank(const PageDemand& demand, uint64_t last_use) const = 0;
+  /// A page is read ahead into the room of this one only when more work than this waits for it.
+  virtual uint64_t worth(const PageDemand& demand) const { return demand.waiting; }
 };
 
-/// least-waiting, least-demand, least-recent.
+/// least-demand, least-waiting, least-recent.
 std::span<const std::string_view> eviction_policy_names();
 /// nullptr for an unknown name.
 std::unique_ptr<EvictionPolicy> make_eviction_policy(std::string_view name);

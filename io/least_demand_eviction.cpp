@@ -8,8 +8,9 @@ namespace {
 class LeastDemand final : public EvictionPolicy {
  public:
   uint64_t rank(const PageDemand& demand, uint64_t /*last_use*/) const override {
-    return demand.waiting + demand.recent / 2;
+    return worth(demand);
   }
+  uint64_t worth(const PageDemand& demand) const override { return demand.waiting + demand.recent; }
 };
 
 }  // namespace

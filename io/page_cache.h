@@ -8,7 +8,8 @@
 //              use; with no WaitingWork this is plain LRU. Exact up to 512 resident pages; above, waiting work may
 //              be stale by one page in 16 (eviction_order.h).
 //   prefetch   prefetch() starts a read and returns; a loader thread verifies, decodes and publishes the page. It takes
-//              the room of a page only when less work waits for that one, so it cannot thrash, and never waits.
+//              the room of a page only when that one is worth less than the work that waits (EvictionPolicy::worth), so it
+//              cannot thrash, and never waits.
 //   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
 //              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
 //              most kMaxPinsPerThread pages.
@@ -84,7 +85,7 @@ enum class Prefetch : uint8_t {
   kStarted,
   kNotNeeded,  ///< resident, or being read already
   kBusy,       ///< as many reads are under way as may be
-  kNoRoom,     ///< everything resident is pinned or has as much work waiting
+  kNoRoom,     ///< everything resident is pinned or worth as much
 };
 
 class PageCache {

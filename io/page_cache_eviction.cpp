@@ -48,6 +48,10 @@ uint64_t PageCache::State::rank_of(PageId page) const {
   return eviction->rank(waiting ? waiting(page) : PageDemand(), slots[page].last_use.load(std::memory_order_relaxed));
 }
 
+uint64_t PageCache::State::worth_of(PageId page) const {
+  return eviction->worth(waiting ? waiting(page) : PageDemand());
+}
+
 std::byte* PageCache::State::try_make_room(uint32_t bytes, uint64_t work, CacheCounters& counters) {
   const uint64_t charge = PageBuffers::charge_bytes(bytes);
   if (charge > capacity_bytes) return nullptr;
@@ -67,20 +71,20 @@ std::byte* PageCache::State::try_make_room(uint32_t bytes, uint64_t work, CacheC
   return buffer.value();
 }
 
-/// Evicts the lowest page for which less than `below_work` waits. False when it saw every page pinned or too busy; the
+/// Evicts the lowest page, if it is worth less than `below_work`. False when it saw every page pinned or too busy; the
 /// pages it had chosen may have been pinned under its eyes.
 bool PageCache::State::evict_one(CacheCounters& counters, uint64_t below_work) {
   while (!order.empty()) {
     const PageId page = order.next().page;
     const bool stale = rank_of(page) > order.highest_rank();
-    if (!stale && below_work != ~0ull && work_of(page) >= below_work) break;
+    if (!stale && below_work != ~0ull && worth_of(page) >= below_work) break;
     order.take();
     if (!stale && try_evict(page, counters)) return true;
   }
   if (!order.empty()) return false;
   rank_candidates();
   while (!order.empty()) {
-    if (below_work != ~0ull && work_of(order.next().page) >= below_work) return false;
+    if (below_work != ~0ull && worth_of(order.next().page) >= below_work) return false;
     if (try_evict(order.take().page, counters)) return true;
   }
   return false;

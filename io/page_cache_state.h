@@ -64,10 +64,11 @@ struct PageCache::State {
   Status load(PageId page, PageLoad& load, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
   Result<std::byte*> make_room(uint32_t bytes, std::unique_lock<std::mutex>& lock, CacheCounters& counters);
   void wait_for_room(std::unique_lock<std::mutex>& lock, CacheCounters& counters);
-  /// Room for a prefetch at the cost of pages with less work only; nullptr when there is none.
+  /// Room for a prefetch at the cost of pages that are worth less than `work` only; nullptr when there is none.
   std::byte* try_make_room(uint32_t bytes, uint64_t work, CacheCounters& counters);
   bool evict_one(CacheCounters& counters, uint64_t below_work = ~0ull);
   uint64_t rank_of(PageId page) const;
+  uint64_t worth_of(PageId page) const;
   uint64_t work_of(PageId page) const { return waiting ? waiting(page).waiting : 0; }
   /// Room for the page and its entry among the loads; nullptr (with the reason) when it is not to be read.
   std::byte* begin_prefetch(PageId page, CacheCounters& counters, Prefetch& answer);

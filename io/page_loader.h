@@ -31,7 +31,7 @@ struct PagingOptions {
   unsigned read_depth = 32;      ///< reads under way at most; 0: every page is read by the thread that wants it
   unsigned loader_threads = 1;   ///< threads that verify and decode
   ReadBackend backend = ReadBackend::kAuto;
-  std::string eviction = "least-waiting";  ///< io/eviction_policy.h
+  std::string eviction = "least-demand";   ///< io/eviction_policy.h
 };
 
 class PageLoader {
