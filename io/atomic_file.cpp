@@ -1,9 +1,11 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 
 #include "io/file.h"
+#include "io/write_behind.h"
 
 namespace shoal {
 namespace {
@@ -19,9 +21,13 @@ std::string temporary_path(const std::string& final_path) {
 
 }  // namespace
 
-Result<AtomicFile> AtomicFile::create(FileSystem& fs, const std::string& final_path) {
-  SHOAL_ASSIGN_OR_RETURN(auto file, fs.create(temporary_path(final_path)));
-  return AtomicFile(fs, std::move(file), final_path);
+Result<AtomicFile> AtomicFile::create(FileSystem& fs, const std::string& final_path, WriteMode mode) {
+  SHOAL_ASSIGN_OR_RETURN(auto file, fs.create(temporary_path(final_path), mode));
+  AtomicFile atomic(fs, std::move(file), final_path);
+  if (mode == WriteMode::kDirect) {
+    SHOAL_ASSIGN_OR_RETURN(atomic.behind_, WriteBehind::create(*atomic.file_));
+  }
+  return atomic;
 }
 
 AtomicFile::AtomicFile(FileSystem& fs, std::unique_ptr<WritableFile> file, std::string final_path)
@@ -32,6 +38,7 @@ AtomicFile::AtomicFile(AtomicFile&&) noexcept = default;
 AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
   std::swap(fs_, other.fs_);
   std::swap(file_, other.file_);
+  std::swap(behind_, other.behind_);
   std::swap(final_path_, other.final_path_);
   std::swap(size_bytes_, other.size_bytes_);
   return *this;
@@ -40,6 +47,7 @@ AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
 AtomicFile::~AtomicFile() {
   if (!file_) return;
   const std::string path = file_->path();
+  behind_.reset();
   file_.reset();
   // Nothing can be done when even this fails; the caller already has the first error.
   (void)fs_->remove(path);
@@ -48,16 +56,30 @@ AtomicFile::~AtomicFile() {
 Status AtomicFile::append(std::span<const std::byte> bytes) { return write_at(size_bytes_, bytes); }
 
 Status AtomicFile::write_at(uint64_t offset, std::span<const std::byte> bytes) {
-  SHOAL_RETURN_IF_ERROR(file_->write_at(offset, bytes));
+  if (!behind_) {
+    SHOAL_RETURN_IF_ERROR(file_->write_at(offset, bytes));
+  } else {
+    static constexpr std::byte kZeros[kBlockBytes] = {};
+    for (; size_bytes_ < offset; size_bytes_ += std::min(offset - size_bytes_, kBlockBytes)) {
+      SHOAL_RETURN_IF_ERROR(behind_->append(std::span(kZeros).first(std::min(offset - size_bytes_, kBlockBytes))));
+    }
+    const auto there = bytes.first(std::min<uint64_t>(bytes.size(), size_bytes_ - offset));
+    if (!there.empty()) SHOAL_RETURN_IF_ERROR(behind_->overwrite(offset, there));
+    SHOAL_RETURN_IF_ERROR(behind_->append(bytes.subspan(there.size())));
+  }
   size_bytes_ = std::max(size_bytes_, offset + bytes.size());
   return {};
 }
 
 Status AtomicFile::commit() {
+  if (behind_) SHOAL_RETURN_IF_ERROR(behind_->flush());
   SHOAL_RETURN_IF_ERROR(file_->sync());
   const std::string temporary = file_->path();
   const Status renamed = fs_->rename(temporary, final_path_);
-  if (renamed.ok()) file_.reset();
+  if (renamed.ok()) {
+    behind_.reset();
+    file_.reset();
+  }
   return renamed;
 }
 

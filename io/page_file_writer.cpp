@@ -89,7 +89,7 @@ Status PageFileWriter::State::write_directory_and_footer() {
 }
 
 Result<PageFileWriter> PageFileWriter::create(FileSystem& fs, const std::string& path) {
-  SHOAL_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(fs, path));
+  SHOAL_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(fs, path, WriteMode::kDirect));
   auto state = std::make_unique<State>(std::move(file), path);
   SHOAL_RETURN_IF_ERROR(state->write_superblock());
   return PageFileWriter(std::move(state));

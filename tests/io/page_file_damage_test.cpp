@@ -6,6 +6,7 @@
 
 #include "io/page_codec.h"
 #include "io/page_format.h"
+#include "io/write_behind.h"
 #include "tests/support/faulty_file_system.h"
 #include "tests/support/memory_file_system.h"
 #include "tests/support/paged_file.h"
@@ -22,6 +23,14 @@ Status write_small_file(FileSystem& fs, const std::string& path) {
   SHOAL_RETURN_IF_ERROR(writer.append_table(8, {}));
   SHOAL_RETURN_IF_ERROR(writer.append(PageKind::kTreelet, pattern_bytes(6000, 2, 50)));
   SHOAL_RETURN_IF_ERROR(writer.append(PageKind::kAttributes, pattern_bytes(4000, 3, 0)));
+  return writer.finish();
+}
+
+/// More pages than the writer gathers before it writes: three writes before the end.
+Status write_large_file(FileSystem& fs, const std::string& path) {
+  const Bytes page = pattern_bytes(kWriteBehindBufferBytes, 4, 0);
+  SHOAL_ASSIGN_OR_RETURN(auto writer, PageFileWriter::create(fs, path));
+  for (int i = 0; i < 3; ++i) SHOAL_RETURN_IF_ERROR(writer.append(PageKind::kTreelet, page));
   return writer.finish();
 }
 
@@ -184,12 +193,13 @@ TEST(PageFileDamage, AFailedWriteLeavesNothingBehind) {
       MemoryFileSystem memory;
       FaultyFileSystem fs(memory);
       fs.arm(fault, call);
-      const Status status = write_small_file(fs, "dir/a.shoal");
+      const Status status = write_large_file(fs, "dir/a.shoal");
       if (status.ok()) break;
       EXPECT_EQ(status.error().code, ErrorCode::kStorage);
+      EXPECT_NE(status.error().message.find("a.shoal"), std::string::npos) << status.error().message;
       EXPECT_TRUE(memory.names().empty()) << "call " << call << " left " << memory.names().front();
     }
-    EXPECT_GE(call, 7u);  // create, superblock, three pages, directory, footer, sync: all were harmed once
+    EXPECT_EQ(call, 7u);  // create, four writes, sync, rename: all were harmed once
   }
 }
 
@@ -212,7 +222,11 @@ TEST(PageFileDamage, AWriterThatFailedStaysFailed) {
   auto writer = PageFileWriter::create(fs, "a.shoal");
   ASSERT_TRUE(writer.ok());
   fs.arm(Fault::kDiskFull, 0);
-  EXPECT_FALSE(writer.value().append(PageKind::kTreelet, pattern_bytes(10, 1, 0)).ok());
+  const Bytes page = pattern_bytes(kWriteBehindBufferBytes, 1, 0);
+  bool failed = false;
+  for (int i = 0; i < 3 && !failed; ++i) failed = !writer.value().append(PageKind::kTreelet, page).ok();
+  EXPECT_TRUE(failed);  // the page itself was written later, by another thread: a page after it hears of it
+  fs.arm(Fault::kNone, 0);
   EXPECT_FALSE(writer.value().append(PageKind::kTreelet, pattern_bytes(10, 1, 0)).ok());
   EXPECT_FALSE(writer.value().finish().ok());
   EXPECT_FALSE(memory.exists("a.shoal"));
@@ -222,9 +236,11 @@ TEST(PageFileDamage, AKilledWriterLeavesAFileThatIsRefused) {
   MemoryFileSystem fs;
   auto writer = PageFileWriter::create(fs, "a.shoal");
   ASSERT_TRUE(writer.ok());
-  ASSERT_TRUE(writer.value().append(PageKind::kTreelet, pattern_bytes(9000, 1, 0)).ok());
+  const Bytes page = pattern_bytes(kWriteBehindBufferBytes, 1, 0);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(writer.value().append(PageKind::kTreelet, page).ok());
   ASSERT_EQ(fs.names().size(), 1u);
   fs.put("killed.shoal", fs.contents(fs.names().front()));
+  ASSERT_GT(fs.contents("killed.shoal").size(), kWriteBehindBufferBytes - 1);
   EXPECT_EQ(open_and_verify(fs, "killed.shoal").error().code, ErrorCode::kCorrupt);
 }
 

@@ -2,9 +2,24 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstring>
 
+#include "io/aligned_buffer.h"
+
 namespace shoal {
+namespace {
+
+/// Zeroes the whole blocks in the range, as a hole punched would; how many bytes that was.
+uint64_t zero_blocks(std::vector<std::byte>& file, uint64_t offset, uint64_t bytes) {
+  const uint64_t begin = align_up(offset, kBlockBytes);
+  const uint64_t end = align_down(std::min<uint64_t>(offset + bytes, file.size()), kBlockBytes);
+  if (begin >= end) return 0;
+  std::memset(file.data() + begin, 0, end - begin);
+  return end - begin;
+}
+
+}  // namespace
 
 class MemoryFileSystem::Reader final : public ReadableFile {
  public:
@@ -47,6 +62,24 @@ class MemoryFileSystem::Writer final : public WritableFile {
   const std::shared_ptr<Bytes> bytes_;
 };
 
+class MemoryFileSystem::Scratch final : public NamelessFile {
+ public:
+  explicit Scratch(uint64_t bytes) : bytes_(bytes) {}
+
+  Status write_at(uint64_t offset, std::span<const std::byte> bytes) override {
+    if (!bytes.empty()) std::memcpy(bytes_.data() + offset, bytes.data(), bytes.size());
+    return {};
+  }
+  Status read_at(uint64_t offset, std::span<std::byte> out) override {
+    if (!out.empty()) std::memcpy(out.data(), bytes_.data() + offset, out.size());
+    return {};
+  }
+  void release(uint64_t offset, uint64_t bytes) override { zero_blocks(bytes_, offset, bytes); }
+
+ private:
+  Bytes bytes_;
+};
+
 Result<std::unique_ptr<ReadableFile>> MemoryFileSystem::open(const std::string& path, ReadMode) {
   const std::lock_guard lock(mutex_);
   const auto found = files_.find(path);
@@ -54,11 +87,22 @@ Result<std::unique_ptr<ReadableFile>> MemoryFileSystem::open(const std::string& 
   return std::unique_ptr<ReadableFile>(std::make_unique<Reader>(path, *found->second));
 }
 
-Result<std::unique_ptr<WritableFile>> MemoryFileSystem::create(const std::string& path) {
+Result<std::unique_ptr<WritableFile>> MemoryFileSystem::create(const std::string& path, WriteMode) {
   const std::lock_guard lock(mutex_);
   auto bytes = std::make_shared<Bytes>();
   files_[path] = bytes;
   return std::unique_ptr<WritableFile>(std::make_unique<Writer>(*this, path, std::move(bytes)));
+}
+
+Result<std::unique_ptr<NamelessFile>> MemoryFileSystem::create_scratch(const std::string&, uint64_t bytes) {
+  return std::unique_ptr<NamelessFile>(std::make_unique<Scratch>(bytes));
+}
+
+Result<uint64_t> MemoryFileSystem::release(const std::string& path, uint64_t offset, uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const auto found = files_.find(path);
+  if (found == files_.end()) return Error{ErrorCode::kStorage, "cannot give back space of " + path + ": no such file"};
+  return zero_blocks(*found->second, offset, bytes);
 }
 
 Status MemoryFileSystem::rename(const std::string& from, const std::string& to) {

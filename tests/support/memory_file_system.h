@@ -15,7 +15,9 @@ namespace shoal {
 class MemoryFileSystem final : public FileSystem {
  public:
   Result<std::unique_ptr<ReadableFile>> open(const std::string& path, ReadMode mode) override;
-  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override;
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path, WriteMode mode) override;
+  Result<std::unique_ptr<NamelessFile>> create_scratch(const std::string& folder, uint64_t bytes) override;
+  Result<uint64_t> release(const std::string& path, uint64_t offset, uint64_t bytes) override;
   Status rename(const std::string& from, const std::string& to) override;
   Status remove(const std::string& path) override;
 
@@ -35,6 +37,7 @@ class MemoryFileSystem final : public FileSystem {
 
   class Reader;
   class Writer;
+  class Scratch;
 };
 
 }  // namespace shoal
