@@ -93,6 +93,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
                     return check_page(scene, record, bytes);
                   },
                   waiting, execution.paging);
+  if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
   if (queued) {

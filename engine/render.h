@@ -36,6 +36,7 @@ struct ExecutionOptions {
   uint64_t rays_in_flight = 0;      ///< 0: from the plan; rounded up to one block
   std::string policy = "resident-first";
   PolicyOptions policy_options;
+  const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "io/mapped_pages.h"
 #include "io/page_cache_state.h"
 
 namespace shoal {
@@ -146,6 +147,10 @@ Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
   State& s = *state_;
   SHOAL_CHECK(page < s.file.page_count());
   counters.page_requests_count += 1;
+  if (s.mapped != nullptr) {
+    counters.page_hits_count += 1;
+    return PagePin(*this, page, s.mapped->bytes(page).data(), s.page_bytes(page));
+  }
   if (s.try_pin(page)) {
     counters.page_hits_count += 1;
     return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
@@ -171,10 +176,14 @@ Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
   return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
 }
 
-void PageCache::unpin(PageId page) { state_->release(page); }
+void PageCache::unpin(PageId page) {
+  if (state_->mapped == nullptr) state_->release(page);
+}
+
+void PageCache::serve_from(const MappedPages* pages) { state_->mapped = pages; }
 
 bool PageCache::resident(PageId page) const {
-  return (state_->slots[page].state.load(std::memory_order_relaxed) & kResident) != 0;
+  return state_->mapped != nullptr || (state_->slots[page].state.load(std::memory_order_relaxed) & kResident) != 0;
 }
 
 uint64_t PageCache::resident_bytes() const { return state_->held_bytes.load(std::memory_order_relaxed); }

@@ -50,6 +50,7 @@ struct CacheCounters {
   void add(const CacheCounters& other);
 };
 
+class MappedPages;
 class PageCache;
 
 /// Keeps one page resident. Movable; the destructor lets go.
@@ -124,6 +125,8 @@ class PageCache {
   CacheCounters background_counters() const;
   uint64_t background_read_bytes() const;
 
+  /// From now on every pin is a hit in these pages, and nothing is read or kept. Requires: nothing was pinned yet.
+  void serve_from(const MappedPages* pages);
   /// A hint without a promise; used by schedulers to trace what is resident first.
   bool resident(PageId page) const;
   /// Memory held now: resident pages, pages being read, and buffers kept for the next page.

@@ -87,6 +87,7 @@ struct PageCache::State {
   const uint64_t capacity_bytes;
   const PageCheck check;
   const WaitingWork waiting;
+  const MappedPages* mapped = nullptr;  // serves every pin when it is there
   const std::unique_ptr<EvictionPolicy> eviction;
   const std::unique_ptr<PageSlot[]> slots;
   std::atomic<uint64_t> tick{0};
