@@ -7,7 +7,6 @@
 #include "engine/process_memory.h"
 #include "engine/queued_paths.h"
 #include "engine/render.h"
-#include "engine/sample_order.h"
 #include "io/page_cache.h"
 
 namespace shoal {
@@ -46,7 +45,7 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture
   const unsigned threads = execution.threads;
   const uint32_t treelets = static_cast<uint32_t>(scene.treelets.size());
   const uint64_t pixels = uint64_t{picture.width} * picture.height;
-  const uint64_t samples = SampleOrder(picture.width, picture.height, picture.samples, picture.tile_sample).count();
+  const uint64_t samples = pixels * picture.samples;
 
   MemoryPlan plan;
   plan.cap_bytes = execution.max_memory_bytes;
