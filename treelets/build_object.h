@@ -13,19 +13,18 @@
 #include "treelets/coverage.h"
 #include "treelets/top_tree.h"
 #include "treelets/treelet_sink.h"
+#include "treelets/triangle_refs.h"
 #include "treelets/triangle_soup.h"
 
 namespace shoal {
 
 struct BuildOptions {
   uint32_t treelet_bytes = 256u << 10;  ///< target of a geometry page, 4 KiB .. 4 MiB; one leaf may exceed it
+  uint32_t pages_in_flight = 0;         ///< packed at once, at most; 0: two a thread
 };
 
 inline constexpr uint32_t kMinTreeletBytes = 4u << 10;
 inline constexpr uint32_t kMaxTreeletBytes = 4u << 20;
-
-/// Corners farther out (or not finite) are skipped: up to here no box, grid plane or edge overflows a float.
-inline constexpr float kMaxCoordinate = 0x1p125f;
 
 /// The tree of one object over its treelets; node and entry indices are local to the object.
 struct BuiltObject {

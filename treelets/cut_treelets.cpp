@@ -71,9 +71,9 @@ class Cutter {
   Cutter(std::span<const BinaryNode> tree, uint32_t treelet_bytes, PageSize& page)
       : tree_(tree), well_filled_bytes_(static_cast<uint64_t>(kWellFilled * treelet_bytes)), page_(page) {}
 
-  TreeletCut cut() {
+  TreeletCut cut(std::span<const uint32_t> starts) {
     cut_.page_begin.push_back(0);
-    waiting_.push_back(0);
+    waiting_.assign(starts.rbegin(), starts.rend());
     while (!waiting_.empty()) {
       const uint32_t root = waiting_.back();
       if (page_.add(root)) {
@@ -128,10 +128,10 @@ class Cutter {
 
 }  // namespace
 
-TreeletCut cut_treelets(std::span<const BinaryNode> tree, const WidePlan& plan, std::span<const uint32_t> order,
-                        const CoverageCropper& cropper, uint32_t treelet_bytes) {
+TreeletCut cut_treelets(std::span<const BinaryNode> tree, std::span<const uint32_t> starts, const WidePlan& plan,
+                        std::span<const uint32_t> order, const CoverageCropper& cropper, uint32_t treelet_bytes) {
   PageSize page(tree, plan, order, cropper, treelet_bytes);
-  return Cutter(tree, treelet_bytes, page).cut();
+  return Cutter(tree, treelet_bytes, page).cut(starts);
 }
 
 }  // namespace shoal
