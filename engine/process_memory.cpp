@@ -1,5 +1,6 @@
 #include "engine/process_memory.h"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -31,5 +32,16 @@ uint64_t memory_limit_bytes() {
       static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
   return std::min(physical, cgroup_limit_bytes());
 }
+
+#if defined(__GLIBC__)
+void give_back_large_blocks() {
+  // Setting it also ends its growth: by itself it rises to the size of what is freed, up to 32 MiB.
+  mallopt(M_MMAP_THRESHOLD, 128 << 10);
+}
+void give_back_freed_memory() { malloc_trim(0); }
+#else
+void give_back_large_blocks() {}
+void give_back_freed_memory() {}
+#endif
 
 }  // namespace shoal

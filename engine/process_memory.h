@@ -1,5 +1,5 @@
-// What the operating system says of memory: limits (physical, engine/cgroup_limit) and this process's resident set.
-// Called by engine/memory_plan and the reports. Linux.
+// What the operating system says of memory: limits (physical, engine/cgroup_limit) and this process's resident set; and
+// what is given back to it. Called by engine/memory_plan, the builder and the reports. Linux.
 #pragma once
 
 #include <cstdint>
@@ -10,5 +10,10 @@ uint64_t resident_set_bytes();       ///< now
 uint64_t peak_resident_set_bytes();  ///< high-water mark of the process
 /// The smaller of physical memory and every cgroup limit above this process.
 uint64_t memory_limit_bytes();
+
+/// From now on large blocks that are freed go back to the system at once. For the whole process; may be called again.
+void give_back_large_blocks();
+/// Gives back what the allocator keeps of freed memory. Cost: a system call an arena.
+void give_back_freed_memory();
 
 }  // namespace shoal

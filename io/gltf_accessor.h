@@ -17,11 +17,11 @@ inline constexpr uint64_t kChunkBytes = 1u << 20;
 /// What is read at once: small enough that vertices in no order at all do not read a megabyte each.
 inline constexpr uint64_t kBlockBytes = 64u << 10;
 
-/// Open files of a document's buffers, opened on first use, at most kMaxOpenFiles at once.
+/// Open files of a document's buffers, opened on first use, at most `max_open_files` at once.
 class BufferFiles {
  public:
   static constexpr size_t kMaxOpenFiles = 128;
-  BufferFiles(FileSystem& fs, const Document& document);
+  BufferFiles(FileSystem& fs, const Document& document, size_t max_open_files = kMaxOpenFiles);
   /// Opens the buffer and checks that it is as long as byteLength says. Fails with: kInput.
   Status check(uint32_t buffer);
   /// Fills `out` from a buffer. Fails with: kInput (missing or shorter than byteLength says), kStorage.
@@ -32,6 +32,7 @@ class BufferFiles {
  private:
   FileSystem* fs_;
   const Document* document_;
+  size_t max_open_files_;
   Result<ReadableFile*> open(uint32_t buffer);
   std::vector<std::unique_ptr<ReadableFile>> files_;  // by buffer; null: not open
   std::vector<uint32_t> open_buffers_;                // oldest first

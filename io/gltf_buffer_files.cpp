@@ -7,13 +7,13 @@
 
 namespace shoal::gltf {
 
-BufferFiles::BufferFiles(FileSystem& fs, const Document& document)
-    : fs_(&fs), document_(&document), files_(document.buffers.size()) {}
+BufferFiles::BufferFiles(FileSystem& fs, const Document& document, size_t max_open_files)
+    : fs_(&fs), document_(&document), max_open_files_(max_open_files), files_(document.buffers.size()) {}
 
 Result<ReadableFile*> BufferFiles::open(uint32_t buffer) {
   if (files_[buffer]) return files_[buffer].get();
   const Buffer& source = document_->buffers[buffer];
-  if (open_buffers_.size() >= kMaxOpenFiles) {
+  if (open_buffers_.size() >= max_open_files_) {
     files_[open_buffers_.front()].reset();
     open_buffers_.erase(open_buffers_.begin());
   }
