@@ -11,8 +11,9 @@ namespace shoal {
 namespace {
 
 struct BuildArguments {
-  std::string scene, output, treelet_size, max_memory;
+  std::string scene, output, treelet_size, max_memory, scratch_folder;
   unsigned threads = 0;
+  bool consume = false;
 };
 
 Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console) {
@@ -25,6 +26,9 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
     SHOAL_ASSIGN_OR_RETURN(options.max_memory_bytes, parse_size(arguments.max_memory));
   }
   SHOAL_RETURN_IF_ERROR(check_output(arguments.output));
+  options.scratch_folder = arguments.scratch_folder;
+  options.consume = arguments.consume;
+  options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
   options.stop = stop_on_signals();
   return build_scene(posix_file_system(), arguments.scene, arguments.output, options);
@@ -42,6 +46,11 @@ int run_build(const BuildArguments& arguments, Console& console) {
                            format_bytes(r.file_bytes),
                            static_cast<double>(r.file_bytes) / static_cast<double>(std::max<uint64_t>(r.triangles_count, 1)),
                            r.seconds, static_cast<double>(r.triangles_count) / std::max(r.seconds, 1e-9) * 1e-6));
+  if (r.chunks_count > 0) {
+    console.info(fmt::format("built out of core in {} chunks, {} through the scratch file", r.chunks_count,
+                             format_bytes(r.scratch_written_bytes)));
+  }
+  if (arguments.consume) console.info(fmt::format("{} of the source given back", format_bytes(r.consumed_bytes)));
   if (r.degenerate_count > 0) console.info(fmt::format("{} degenerate triangles skipped", r.degenerate_count));
   return 0;
 }
@@ -54,7 +63,13 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("scene", arguments->scene, "a .gltf or .glb")->required();
   sub->add_option("-o,--output", arguments->output, "the .shoal to write")->required();
   sub->add_option("--treelet-size", arguments->treelet_size, "bytes of a treelet, 4K to 4M (default 256K)");
-  sub->add_option("--max-memory", arguments->max_memory, "cap on the whole process, such as 2G");
+  sub->add_option("--max-memory", arguments->max_memory, "cap on the whole process, such as 2G (default: 70 % of what there is)");
+  sub->add_option("--scratch", arguments->scratch_folder,
+                  "folder for what does not fit in memory: 40 bytes a triangle and 12 for each float of a corner's "
+                  "attributes (default: that of the output)");
+  sub->add_flag("--consume", arguments->consume,
+                "DESTROYS the source: gives the disk space of its .bin parts back while they are read, even if the build "
+                "fails later; .gltf and images stay; not for .glb");
   sub->add_option("--threads", arguments->threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_build(*arguments, console); };

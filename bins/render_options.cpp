@@ -45,6 +45,7 @@ Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOp
   const std::string path = (folder / fmt::format("{:016x}.shoal", key)).string();
   if (std::filesystem::exists(path, code)) return path;
   console.info(fmt::format("building {} into {}", arguments.scene, path));
+  options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
   options.stop = stop_on_signals();
   auto report = build_scene(fs, arguments.scene, path, options);
@@ -249,6 +250,16 @@ std::string describe_plan(const MemoryPlan& plan) {
                      format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.film_bytes),
                      plan.paths_in_flight, format_bytes(plan.paths_bytes), format_bytes(plan.cache_bytes),
                      format_bytes(plan.scene_page_bytes), format_bytes(plan.scratch_bytes));
+}
+
+std::string describe_plan(const BuildMemoryPlan& plan) {
+  return fmt::format("memory: cap {}; process {}, document {}, tables {}, coverage {}, writing {}; then reading {} and "
+                     "sorting {}, or one chunk {} and {} pages in flight {}",
+                     format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.document_bytes),
+                     format_bytes(plan.tables_bytes), format_bytes(plan.coverage_bytes),
+                     format_bytes(plan.writing_bytes), format_bytes(plan.reading_bytes),
+                     format_bytes(plan.buffers_bytes), format_bytes(plan.chunk_bytes), plan.pages_in_flight,
+                     format_bytes(plan.pages_bytes));
 }
 
 std::function<void(const BuildProgress&)> build_progress(Console& console) {

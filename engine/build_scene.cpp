@@ -5,12 +5,17 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <new>
 
+#include "engine/build_chunks.h"
 #include "engine/build_record.h"
+#include "engine/consume_source.h"
 #include "engine/emitters.h"
+#include "engine/measure_images.h"
 #include "engine/place_instances.h"
 #include "engine/plan_objects.h"
+#include "engine/process_memory.h"
 #include "engine/scene_writer.h"
 #include "engine/tile_textures.h"
 
@@ -18,10 +23,6 @@ namespace shoal {
 
 namespace {
 
-/// Scratch of treelets/build_object a triangle, from its header.
-constexpr uint64_t kBuilderBytesPerTriangle = 150;
-/// Code, tables, page buffers and the allocator, beside what is counted.
-constexpr uint64_t kFixedBuildBytes = 64u << 20;
 constexpr size_t kMaxWarnings = 100;
 
 class SceneBuilder {
@@ -29,36 +30,43 @@ class SceneBuilder {
   SceneBuilder(FileSystem& fs, const std::string& path, const SceneBuildOptions& options)
       : fs_(fs), path_(path), options_(options) {}
 
+  /// What was taken from the source so far, which no error gives back.
+  uint64_t consumed_bytes() const { return consumer_ ? consumer_->released_bytes() : 0; }
+
   Result<SceneBuildReport> run(const std::string& output) {
     const auto start = std::chrono::steady_clock::now();
+    give_back_large_blocks();
+    scratch_folder_ = options_.scratch_folder;
+    if (scratch_folder_.empty()) scratch_folder_ = std::filesystem::path(output).parent_path().string();
+    if (scratch_folder_.empty()) scratch_folder_.push_back('.');
     SHOAL_RETURN_IF_ERROR(read_document());
     gltf::BufferFiles files(fs_, document_);
     SHOAL_ASSIGN_OR_RETURN(geometry_, plan_geometry(files, document_, flat_));
     SHOAL_ASSIGN_OR_RETURN(materials_, plan_materials(document_, geometry_.uses));
     note(geometry_.warnings);
     note(materials_.warnings);
-    SHOAL_RETURN_IF_ERROR(check_memory());
+    SHOAL_RETURN_IF_ERROR(plan_memory(files));
+    if (options_.consume) {
+      SHOAL_ASSIGN_OR_RETURN(consumer_,
+                             SourceConsumer::plan(fs_, document_, geometry_, output, report_.warnings));
+    }
     SHOAL_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(fs_, output));
     CoverageTextures coverage(materials_.textures.size());
     SHOAL_RETURN_IF_ERROR(store_textures(files, writer, coverage));
     TreeletPageSink sink(writer, options_.stop);
-    SHOAL_RETURN_IF_ERROR(build_objects(files, coverage, sink));
+    SHOAL_RETURN_IF_ERROR(build_objects(coverage, sink));
     SHOAL_RETURN_IF_ERROR(place_objects());
     report_.source_read_bytes += files.read_bytes();
     SHOAL_RETURN_IF_ERROR(write_tables(writer, sink));
     SHOAL_RETURN_IF_ERROR(writer.finish());
     report_.file_bytes = writer.bytes_written();
+    report_.consumed_bytes = consumed_bytes();
     progress("writing", 1);
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return std::move(report_);
   }
 
  private:
-  Status check_stop() const {
-    if (options_.stop == nullptr || !options_.stop->load(std::memory_order_relaxed)) return {};
-    return Error{ErrorCode::kStopped, fmt::format("{}: the build was stopped before it was complete", path_)};
-  }
-
   void progress(const char* stage, double fraction) const {
     if (options_.progress) options_.progress({stage, fraction});
   }
@@ -69,6 +77,8 @@ class SceneBuilder {
 
   Status read_document() {
     progress("reading", 0);
+    SHOAL_ASSIGN_OR_RETURN(document_bytes_, document_bytes(fs_, path_));
+    SHOAL_RETURN_IF_ERROR(check_document(document_bytes_, cap_bytes(), path_));
     SHOAL_ASSIGN_OR_RETURN(document_, gltf::load_document(fs_, path_, options_.limits));
     note(document_.warnings);
     SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
@@ -77,26 +87,49 @@ class SceneBuilder {
     return {};
   }
 
-  /// Refuses a scene whose largest object does not fit, before anything is read. One object is in memory at a time.
-  Status check_memory() const {
-    if (options_.max_memory_bytes == 0) return {};
-    uint64_t largest = 0;
+  uint64_t cap_bytes() const {
+    return options_.max_memory_bytes > 0 ? options_.max_memory_bytes : default_build_cap_bytes();
+  }
+
+  /// Shares the cap out, before anything of size is read.
+  Status plan_memory(gltf::BufferFiles& files) {
+    BuildMemoryNeeds needs;
+    const ImageNeeds images = measure_images(fs_, files, document_, materials_.textures);
+    needs.image_bytes = images.largest_bytes;
+    needs.coverage_bytes = images.coverage_bytes;
+    needs.document_bytes = document_bytes_;
     for (const ObjectPlan& object : geometry_.objects) {
-      const CornerLayout layout = object_layout(document_, geometry_, object, materials_);
-      const uint64_t soup_bytes = 36 + 8 + uint64_t{12} * layout.floats();
-      largest = std::max(largest, object_triangles(geometry_, object) * (soup_bytes + kBuilderBytesPerTriangle));
+      needs.objects.push_back(
+          {object_triangles(geometry_, object), object_layout(document_, geometry_, object, materials_)});
+      const uint64_t emitters = emitting_triangles(object);
+      const uint64_t shown = object.baked ? 1 : geometry_.meshes[object.meshes[0]].placements.size();
+      needs.instances += shown;
+      needs.emitters += emitters * (1 + 2 * shown);
     }
-    const uint64_t needed = largest + kFixedBuildBytes;
-    if (needed <= options_.max_memory_bytes) return {};
-    return Error{ErrorCode::kMemoryCap, fmt::format("{}: building needs {} MiB at least, the memory cap is {} MiB",
-                                                    path_, (needed >> 20) + 1, options_.max_memory_bytes >> 20)};
+    needs.treelet_bytes = options_.treelet_bytes;
+    needs.threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+    needs.forced_chunk_triangles = options_.chunk_triangles;
+    SHOAL_ASSIGN_OR_RETURN(memory_, plan_build_memory(needs, cap_bytes(), path_));
+    if (options_.planned) options_.planned(memory_);
+    return {};
+  }
+
+  /// At most, before textures are read: a black one makes its material dark.
+  uint64_t emitting_triangles(const ObjectPlan& object) const {
+    uint64_t count = 0;
+    for (const uint32_t mesh : object.meshes) {
+      for (const PrimitiveSource& source : geometry_.meshes[mesh].primitives) {
+        const gltf::Primitive& primitive = document_.meshes[source.mesh].primitives[source.primitive];
+        const float* emissive = materials_.materials[materials_.material_of(primitive)].emissive;
+        if (emissive[0] > 0 || emissive[1] > 0 || emissive[2] > 0) count += source.triangle_count;
+      }
+    }
+    return count;
   }
 
   Status store_textures(gltf::BufferFiles& files, PageFileWriter& writer, CoverageTextures& coverage) {
     gltf::Limits limits = options_.limits;
-    if (options_.max_memory_bytes > 0) {
-      limits.image_pixels = std::min(limits.image_pixels, options_.max_memory_bytes / kImageScratchBytesPerPixel);
-    }
+    limits.image_pixels = std::min(limits.image_pixels, memory_.image_bytes() / kImageScratchBytesPerPixel);
     SHOAL_ASSIGN_OR_RETURN(textures_,
                            tile_textures(fs_, files, document_, materials_.textures, limits, writer, coverage,
                                          [this](double fraction) { progress("textures", fraction); }));
@@ -106,47 +139,49 @@ class SceneBuilder {
     return {};
   }
 
-  Status build_objects(gltf::BufferFiles& files, const CoverageTextures& coverage, TreeletSink& sink) {
+  Status build_objects(const CoverageTextures& coverage, TreeletSink& sink) {
     for (const ObjectPlan& object : geometry_.objects) total_triangles_ += object_triangles(geometry_, object);
-    for (const ObjectPlan& object : geometry_.objects) {
-      SHOAL_ASSIGN_OR_RETURN(TriangleSoup soup, read_object(files, object));
-      emitters_of_.push_back(collect_emitters(soup, materials_.materials));
-      progress("building", static_cast<double>(read_triangles_) / static_cast<double>(total_triangles_));
-      SHOAL_RETURN_IF_ERROR(check_stop());
-      BuiltObject built;
-      if (soup.size() > 0) {
-        SHOAL_ASSIGN_OR_RETURN(built, build_object(std::move(soup), {options_.treelet_bytes}, &coverage, sink));
-      }
-      report_.triangles_count += built.triangles_count;
-      report_.degenerate_count += built.degenerate_count;
-      report_.sah_cost += built.sah_cost;
-      built_.push_back(std::move(built));
-    }
+    const StreamInput stream{fs_, document_, flat_, geometry_, materials_, options_.stop, memory_.lanes};
+    const ObjectBuildInput input{
+        fs_, path_, scratch_folder_, options_.stop, {options_.treelet_bytes, memory_.pages_in_flight},
+        memory_, coverage, materials_.materials, sink,
+        [this](const char* stage, uint64_t triangles) { count_progress(stage, triangles); },
+        [this](const PrimitiveSource& source) { return consumer_ ? consumer_->source_done(source) : Status(); }};
+    for (const ObjectPlan& object : geometry_.objects) SHOAL_RETURN_IF_ERROR(build(object, stream, input));
     return {};
   }
 
-  Result<TriangleSoup> read_object(gltf::BufferFiles& files, const ObjectPlan& object) {
-    TriangleSoup soup;
-    soup.layout = object_layout(document_, geometry_, object, materials_);
-    const size_t count = object_triangles(geometry_, object);
-    soup.positions.reserve(9 * count);
-    soup.primitive.reserve(count);
-    soup.material.reserve(count);
-    soup.corners.reserve(3 * count * soup.layout.floats());
-    ReadCounts counts;
-    for (const uint32_t m : object.meshes) {
-      const MeshPlan& mesh = geometry_.meshes[m];
-      const AffineDouble* bake = object.baked ? &flat_.meshes[mesh.placements[0]].to_world : nullptr;
-      for (const PrimitiveSource& source : mesh.primitives) {
-        SHOAL_RETURN_IF_ERROR(append_primitive(files, document_, materials_, source, bake, soup, counts));
-        read_triangles_ += source.triangle_count;
-        progress("reading", static_cast<double>(read_triangles_) / static_cast<double>(total_triangles_));
-        SHOAL_RETURN_IF_ERROR(check_stop());
+  Status build(const ObjectPlan& object, const StreamInput& stream, const ObjectBuildInput& input) {
+    for (const uint32_t mesh : object.meshes) {
+      for (const PrimitiveSource& source : geometry_.meshes[mesh].primitives) {
+        note_missing_uv_sets(document_, materials_, source, report_.warnings);
       }
     }
-    report_.degenerate_count += counts.degenerate_count;
-    note(counts.warnings);
-    return soup;
+    const uint64_t triangles = object_triangles(geometry_, object);
+    ObjectSource source(stream, object, object_layout(document_, geometry_, object, materials_));
+    const MaterialLookup lookup(document_, geometry_, materials_, object);
+    const bool fits = triangles <= memory_.chunk_triangles(source.layout());
+    SHOAL_ASSIGN_OR_RETURN(ObjectBuildOutput built, fits ? build_at_once(source, triangles, input)
+                                                         : build_in_chunks(source, triangles, lookup, input));
+    report_.source_read_bytes += source.read_bytes();
+    report_.triangles_count += built.object.triangles_count;
+    report_.degenerate_count += built.degenerate_count + built.object.degenerate_count;
+    report_.sah_cost += built.object.sah_cost;
+    report_.chunks_count += built.chunks_count;
+    report_.scratch_written_bytes += built.scratch_written_bytes;
+    report_.scratch_read_bytes += built.scratch_read_bytes;
+    emitters_of_.push_back(std::move(built.emitters));
+    built_.push_back(std::move(built.object));
+    give_back_freed_memory();
+    return {};
+  }
+
+  /// Stages go over all triangles of the scene, an object at a time.
+  void count_progress(const char* stage, uint64_t triangles) {
+    auto done = std::find_if(stages_.begin(), stages_.end(), [&](const auto& s) { return s.first == stage; });
+    if (done == stages_.end()) done = stages_.insert(stages_.end(), {stage, 0});
+    done->second += triangles;
+    progress(stage, static_cast<double>(done->second) / static_cast<double>(total_triangles_));
   }
 
   Status place(uint32_t object, const AffineDouble& to_world, const std::string& name) {
@@ -239,7 +274,11 @@ class SceneBuilder {
   std::vector<std::vector<Emitter>> emitters_of_;  // likewise, object space
   std::vector<PlacedInstance> placed_;
   std::vector<Emitter> emitters_;
-  uint64_t total_triangles_ = 0, read_triangles_ = 0;
+  BuildMemoryPlan memory_;
+  std::optional<SourceConsumer> consumer_;
+  std::string scratch_folder_;
+  uint64_t document_bytes_ = 0, total_triangles_ = 0;
+  std::vector<std::pair<std::string, uint64_t>> stages_;  // triangles done
 };
 
 }  // namespace
@@ -247,8 +286,12 @@ class SceneBuilder {
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
                                      const SceneBuildOptions& options) {
   const auto run = [&]() -> Result<SceneBuildReport> {
+    SceneBuilder builder(fs, gltf_path, options);
     try {
-      return SceneBuilder(fs, gltf_path, options).run(output);
+      auto result = builder.run(output);
+      if (result.ok() || builder.consumed_bytes() == 0) return result;
+      return Error{result.error().code,
+                   fmt::format("{}; the source was consumed in part and is no longer whole", result.error().message)};
     } catch (const std::bad_alloc&) {
       return Error{ErrorCode::kMemoryCap, fmt::format("{}: the build ran out of memory", gltf_path)};
     }

@@ -9,22 +9,29 @@
 #include <string>
 #include <vector>
 
+#include "engine/build_memory_plan.h"
 #include "io/gltf_document.h"
 #include "io/result.h"
 
 namespace shoal {
 
 struct BuildProgress {
-  const char* stage = "";  ///< "reading", "building", "textures", "writing"
+  const char* stage = "";  ///< "reading", "textures", "measuring", "counting", "sorting", "building", "writing"
   double fraction = 0;     ///< of the stage
 };
 
 struct SceneBuildOptions {
   uint32_t treelet_bytes = 256u << 10;
   unsigned threads = 0;           ///< 0: all
-  uint64_t max_memory_bytes = 0;  ///< 0: no cap; else a scene that needs more is refused before it is read
+  uint64_t max_memory_bytes = 0;  ///< of the whole process; 0: 70 % of what there is
+  std::string scratch_folder;     ///< for objects that do not fit; empty: the folder of the output
+  /// Gives the space of the source's binary parts back as soon as each was read for the last time. Destroys the source,
+  /// also when the build fails or is stopped later on. Not for .glb.
+  bool consume = false;
+  uint64_t chunk_triangles = 0;   ///< triangles built at once; 0: from the memory plan (else for tests)
   gltf::Limits limits;
   const std::atomic<bool>* stop = nullptr;             ///< ends the build with kStopped when it becomes true
+  std::function<void(const BuildMemoryPlan&)> planned;  ///< may be empty; called once, before work starts
   std::function<void(const BuildProgress&)> progress;  ///< may be empty; called from the building thread
 };
 
@@ -32,6 +39,9 @@ struct SceneBuildReport {
   uint64_t triangles_count = 0, instanced_triangles_count = 0, degenerate_count = 0;
   uint64_t treelets_count = 0, instances_count = 0, objects_count = 0;
   uint64_t file_bytes = 0, geometry_bytes = 0, source_read_bytes = 0;
+  uint64_t chunks_count = 0;  ///< that objects which did not fit were built in
+  uint64_t scratch_written_bytes = 0, scratch_read_bytes = 0;
+  uint64_t consumed_bytes = 0;  ///< of the source, given back
   double sah_cost = 0;
   double seconds = 0;
   std::vector<std::string> warnings;
