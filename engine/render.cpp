@@ -44,6 +44,8 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   return {};
 }
 
+/// Reads that a decision starts at most, over those under way at once: so that the disk has work until the next one.
+constexpr uint32_t kLoadsADecision = 8;
 /// Larger scenes decide for longer: a decision looks at every treelet.
 constexpr uint32_t kTreeletsADrain = 256;
 
@@ -55,7 +57,7 @@ PolicyOptions scaled_policy(const ExecutionOptions& execution, uint32_t treelets
   PolicyOptions options = execution.policy_options;
   options.drains = std::max(options.drains, treelets / kTreeletsADrain);
   if (options.rays_ahead == 0) options.rays_ahead = std::max(kLeastRaysAhead, paths_in_flight / kPathsAheadShare);
-  options.loads = execution.paging.read_depth == 0 ? 0 : std::max(options.drains, 2 * execution.paging.read_depth);
+  options.loads = execution.paging.read_depth == 0 ? 0 : std::max(options.drains, kLoadsADecision * execution.paging.read_depth);
   return options;
 }
 
@@ -99,7 +101,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   if (queued) {
     const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
         execution.policy, scaled_policy(execution, static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight));
-    TreeletScheduler scheduler(scene, *paths, cache, *policy, page_treelets);
+    TreeletScheduler scheduler(scene, *paths, cache, *policy, batches, page_treelets);
     render_queued(context, *paths, scheduler, batches);
   } else {
     render_depth_first(context);

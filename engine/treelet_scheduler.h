@@ -24,13 +24,18 @@ namespace shoal {
 /// For every page the treelet it belongs to, kNoIndex for texture tiles and tables.
 std::vector<TreeletId> treelet_of_pages(const Scene& scene);
 
-/// What usually waits for a treelet when it is drained: the mean of the drains, the last ones weighing most.
+/// What usually waits for a treelet when it is drained: the mean of the drains, the last ones weighing most; fades while
+/// it is not drained, so that what gathered long ago does not keep out what is wanted now.
 class UsualBatches {
  public:
   explicit UsualBatches(size_t treelets) : batches_(treelets) {}
   uint32_t of(TreeletId treelet) const { return batches_[treelet].load(std::memory_order_relaxed); }
   void note(TreeletId treelet, uint32_t drained) {
     batches_[treelet].store((of(treelet) + drained) / 2, std::memory_order_relaxed);
+  }
+  void fade(TreeletId treelet, uint32_t divisor) {
+    const uint32_t usual = of(treelet);
+    if (usual > 0) batches_[treelet].store(usual - (usual + divisor - 1) / divisor, std::memory_order_relaxed);
   }
 
  private:
@@ -40,8 +45,13 @@ class UsualBatches {
 class TreeletScheduler {
  public:
   TreeletScheduler(const Scene& scene, const QueuedPaths& paths, PageCache& cache, DrainPolicy& policy,
-                   std::span<const TreeletId> page_treelets)
-      : scene_(scene), paths_(paths), cache_(cache), policy_(policy), page_treelets_(page_treelets) {}
+                   UsualBatches& batches, std::span<const TreeletId> page_treelets)
+      : scene_(scene),
+        paths_(paths),
+        cache_(cache),
+        policy_(policy),
+        batches_(batches),
+        page_treelets_(page_treelets) {}
 
   /// The treelet to drain next, or kNoIndex: nothing is worth it yet, or what is wanted is still on its way.
   TreeletId choose(bool more_coming, CacheCounters& counters);
@@ -63,13 +73,15 @@ class TreeletScheduler {
   const QueuedPaths& paths_;
   PageCache& cache_;
   DrainPolicy& policy_;
+  UsualBatches& batches_;
   std::span<const TreeletId> page_treelets_;
 
   std::mutex mutex_;
   Decision decision_;
   size_t next_drain_ = 0, next_load_ = 0;
+  bool no_room_ = false;         ///< for what the decision wanted: what is resident is worth more
   uint64_t rays_in_memory_ = 0;  ///< left of those that the decision saw
-  double decided_seconds_ = 0;
+  double next_decision_seconds_ = 0;  ///< while reads are under way, not before
   std::vector<WaitingTreelet> work_;
   std::vector<PageId> loaded_;
 };
