@@ -220,12 +220,10 @@ Status trace_random_rays(const RandomRun& run) {
         return id == kNoIndex ? PageDemand() : PageDemand(slots.waiting(id), batches.of(id));
       },
       PagingOptions{});
-  PolicyOptions options;
-  options.drains = std::max(options.drains, treelets / 256);
-  options.loads = std::max(options.drains, 2 * PagingOptions{}.read_depth);
+  const PolicyOptions options = scaled_policy({}, {}, treelets, in_flight);
   const std::unique_ptr<DrainPolicy> policy = make_drain_policy(run.policy, options);
   if (policy == nullptr) return Error{ErrorCode::kUsage, "unknown policy " + run.policy};
-  TreeletScheduler scheduler(scene, slots, cache, *policy, page_treelets);
+  TreeletScheduler scheduler(scene, slots, cache, *policy, batches, page_treelets);
   RandomContext context{scene, starts, slots, scheduler, batches, cache};
   const double start = now_seconds();
   run_on_threads(threads, [&](unsigned) { std::make_unique<RandomWorker>(context)->run(); });

@@ -44,23 +44,6 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   return {};
 }
 
-/// Reads that a decision starts at most, over those under way at once: so that the disk has work until the next one.
-constexpr uint32_t kLoadsADecision = 8;
-/// Larger scenes decide for longer: a decision looks at every treelet.
-constexpr uint32_t kTreeletsADrain = 256;
-
-/// Of the paths in flight, the part whose rays may wait in memory while more is read, and the least of it. Small values
-/// read less and drain smaller batches, which cost more time (docs/decisions/0013).
-constexpr uint32_t kPathsAheadShare = 4, kLeastRaysAhead = 16384;
-
-PolicyOptions scaled_policy(const ExecutionOptions& execution, uint32_t treelets, uint32_t paths_in_flight) {
-  PolicyOptions options = execution.policy_options;
-  options.drains = std::max(options.drains, treelets / kTreeletsADrain);
-  if (options.rays_ahead == 0) options.rays_ahead = std::max(kLeastRaysAhead, paths_in_flight / kPathsAheadShare);
-  options.loads = execution.paging.read_depth == 0 ? 0 : std::max(options.drains, kLoadsADecision * execution.paging.read_depth);
-  return options;
-}
-
 }  // namespace
 
 Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
@@ -100,7 +83,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.start_seconds = start;
   if (queued) {
     const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
-        execution.policy, scaled_policy(execution, static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight));
+        execution.policy, scaled_policy(execution.policy_options, execution.paging,
+                                        static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight));
     TreeletScheduler scheduler(scene, *paths, cache, *policy, batches, page_treelets);
     render_queued(context, *paths, scheduler, batches);
   } else {

@@ -13,7 +13,24 @@ constexpr double kLeastDecisionSeconds = 0.5e-3;
 /// What usually gathers fades by one part in so many a decision.
 constexpr uint32_t kFade = 16;
 
+/// Reads that a decision starts at most, over those under way at once: so that the disk has work until the next one.
+constexpr uint32_t kLoadsADecision = 8;
+/// Larger scenes decide for longer: a decision looks at every treelet.
+constexpr uint32_t kTreeletsADrain = 256;
+
+/// Of the paths in flight, the part whose rays may wait in memory while more is read, and the least of it. Small values
+/// read less and drain smaller batches, which cost more time (docs/decisions/0013).
+constexpr uint32_t kPathsAheadShare = 4, kLeastRaysAhead = 16384;
+
 }  // namespace
+
+PolicyOptions scaled_policy(PolicyOptions options, const PagingOptions& paging, uint32_t treelets,
+                            uint32_t paths_in_flight) {
+  options.drains = std::max(options.drains, treelets / kTreeletsADrain);
+  if (options.rays_ahead == 0) options.rays_ahead = std::max(kLeastRaysAhead, paths_in_flight / kPathsAheadShare);
+  options.loads = paging.read_depth == 0 ? 0 : std::max(options.drains, kLoadsADecision * paging.read_depth);
+  return options;
+}
 
 std::vector<TreeletId> treelet_of_pages(const Scene& scene) {
   std::vector<TreeletId> treelets(scene.file->page_count(), kNoIndex);

@@ -21,6 +21,10 @@
 
 namespace shoal {
 
+/// Fits the lengths of decisions to the size of the scene and to the paths in flight.
+PolicyOptions scaled_policy(PolicyOptions options, const PagingOptions& paging, uint32_t treelets,
+                            uint32_t paths_in_flight);
+
 /// For every page the treelet it belongs to, kNoIndex for texture tiles and tables.
 std::vector<TreeletId> treelet_of_pages(const Scene& scene);
 
