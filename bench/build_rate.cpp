@@ -23,6 +23,9 @@ namespace {
 using namespace shoal;
 using Json = nlohmann::ordered_json;
 
+/// Less cannot work, whatever the scene: program and buffers.
+constexpr uint64_t kLeastCapBytes = 64ull << 20;
+
 struct Arguments {
   uint64_t triangles = 40'000'000, cap_bytes = 0;
   std::string gltf, folder = std::filesystem::temp_directory_path().string(), json, program;
@@ -184,7 +187,7 @@ int run(const Arguments& arguments) {
   const std::string gltf = arguments.gltf.empty() ? generated(arguments, folder / "scene") : arguments.gltf;
   std::filesystem::create_directories(folder);
   const uint64_t input_bytes = bytes_of_folder(std::filesystem::path(gltf).parent_path());
-  const uint64_t cap = arguments.cap_bytes > 0 ? arguments.cap_bytes : input_bytes / 4;
+  const uint64_t cap = arguments.cap_bytes > 0 ? arguments.cap_bytes : std::max(input_bytes / 4, kLeastCapBytes);
   const std::string output = (folder / "built.shoal").string();
   // A process of its own, so that its peak of memory is its own.
   const testing::MeasuredRun built = testing::run_measured(
@@ -230,10 +233,11 @@ int main(int argc, char** argv) {
   arguments.program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "shoal").string();
   CLI::App app{"Building: triangles a second under a cap, beside Embree in memory", "build_rate"};
   app.add_option("--triangles", arguments.triangles, "of the generated terrain, such as 100M")
-      ->transform(CLI::AsNumberWithUnit(std::map<std::string, uint64_t>{{"K", 1000}, {"M", 1000000}, {"G", 1000000000}}))
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, uint64_t>{{"K", 1000}, {"M", 1000000}, {"G", 1000000000}}))
       ->capture_default_str();
   app.add_option("--gltf", arguments.gltf, "built in place of the terrain");
-  app.add_option("--cap", arguments.cap_bytes, "such as 512M (default: a quarter of the source)")
+  app.add_option("--cap", arguments.cap_bytes, "such as 512M (default: a quarter of the source, at least 64M)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--threads", arguments.threads, "of both")->capture_default_str();
   app.add_option("--folder", arguments.folder, "for source and output")->capture_default_str();
