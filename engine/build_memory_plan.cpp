@@ -18,8 +18,8 @@ namespace shoal {
 namespace {
 
 constexpr uint64_t kMiB = 1ull << 20;
-/// Program, libraries, stacks of the threads and what the allocator keeps: 14 MiB were seen at the end of small builds.
-constexpr uint64_t kProcessBytes = 20 * kMiB;
+/// Program, libraries, stacks of the threads and what the allocator keeps: 13 MiB were seen.
+constexpr uint64_t kProcessBytes = 16 * kMiB;
 /// Of a thread: its stack and its part of the allocator.
 constexpr uint64_t kThreadBytes = kMiB / 2;
 /// The page writer: a page raw, compressed and padded, beside what is written behind.
@@ -37,7 +37,7 @@ constexpr uint64_t kEmitterBytes = 72;
 constexpr uint64_t kTextFactor = 4, kObjectBytes = 320, kValueBytes = 48;
 constexpr uint64_t kSmallDocumentBytes = 32 * kMiB;
 /// Smaller chunks are not worth their share of seeks and of pages that are not full.
-constexpr uint64_t kMinChunkTriangles = 32768;
+constexpr uint64_t kMinChunkTriangles = 16384;
 constexpr uint64_t kMaxWriteBufferBytes = 256u << 10;
 constexpr uint32_t kMinGridCells = 4096, kMaxGridCells = 1u << 18;
 constexpr uint64_t kTrianglesPerCell = 128;

@@ -45,10 +45,13 @@ class TreeBuilder {
     Range root{0, static_cast<uint32_t>(refs_.size()), 0, {}, {}};
     measure(root);
     const std::unique_ptr<Fragment> fragment = build_fragment(root);
-    std::vector<BinaryNode> nodes(count_nodes(*fragment));
-    uint32_t next = 1;
-    flatten(*fragment, 0, next, nodes);
-    SHOAL_CHECK(next == nodes.size());
+    // Grows into what was reserved while fragments are freed: the nodes are not there twice.
+    const size_t count = count_nodes(*fragment);
+    std::vector<BinaryNode> nodes;
+    nodes.reserve(count);
+    nodes.resize(1);
+    flatten(*fragment, 0, nodes);
+    SHOAL_CHECK(count == nodes.size());
     return nodes;
   }
 
@@ -135,23 +138,29 @@ class TreeBuilder {
     return f.left ? 1 + count_nodes(*f.left) + count_nodes(*f.right) : f.nodes.size();
   }
 
-  // Writes the fragment's root at `index` and everything below from `next` on.
-  static void flatten(Fragment& f, uint32_t index, uint32_t& next, std::vector<BinaryNode>& nodes) {
+  // Writes the fragment's root at `index` and everything below at the end.
+  static void flatten(Fragment& f, uint32_t index, std::vector<BinaryNode>& nodes) {
     if (f.left) {
       nodes[index] = f.node;
-      const uint32_t child = nodes[index].left = next;
-      next += 2;
-      flatten(*f.left, child, next, nodes);
-      flatten(*f.right, child + 1, next, nodes);
+      const auto child = static_cast<uint32_t>(nodes.size());
+      nodes[index].left = child;
+      nodes.resize(nodes.size() + 2);
+      flatten(*f.left, child, nodes);
+      f.left.reset();
+      flatten(*f.right, child + 1, nodes);
+      f.right.reset();
       return;
     }
-    const uint32_t shift = next - 1;  // nodes[1] of the run goes to `next`
+    const auto shift = static_cast<uint32_t>(nodes.size() - 1);  // nodes[1] of the run comes next
     for (size_t i = 0; i < f.nodes.size(); ++i) {
       BinaryNode node = f.nodes[i];
       if (!node.leaf()) node.left += shift;
-      nodes[i == 0 ? index : shift + i] = node;
+      if (i == 0) {
+        nodes[index] = node;
+      } else {
+        nodes.push_back(node);
+      }
     }
-    next += static_cast<uint32_t>(f.nodes.size() - 1);
     f.nodes = {};
   }
 
