@@ -10,11 +10,15 @@ namespace {
 /// nothing to do took 70 % of the time, and the disk waited for it: terrain of 1 G triangles, 64,000 treelets.)
 constexpr double kDecisionShare = 0.1;
 constexpr double kLeastDecisionSeconds = 0.5e-3;
-/// What usually gathers fades by one part in so many a decision.
-constexpr uint32_t kFade = 16;
+/// While what usually gathers keeps out what is wanted, and less than one part in kStarvedShare of the rays that should
+/// wait in memory does, it fades, to 1/e in so many seconds. Fast fading doubles the bytes that the last rays read; none
+/// at all leaves the disk idle meanwhile (docs/decisions/0013).
+constexpr uint32_t kStarvedShare = 8;
+constexpr double kFadeSeconds = 4;
+constexpr uint32_t kFadeSteps = 16;  ///< in that time
 
 /// Reads that a decision starts at most, over those under way at once: so that the disk has work until the next one.
-constexpr uint32_t kLoadsADecision = 8;
+constexpr uint32_t kLoadsADecision = 2;
 /// Larger scenes decide for longer: a decision looks at every treelet.
 constexpr uint32_t kTreeletsADrain = 256;
 
@@ -80,11 +84,14 @@ void TreeletScheduler::take_loaded() {
 
 void TreeletScheduler::decide(bool more_coming) {
   const double start = now_seconds();
+  const bool starved = no_room_ && decision_.rays_in_memory < decision_.load_below_rays / kStarvedShare;
+  const bool fade = starved && start - faded_seconds_ > kFadeSeconds / kFadeSteps;
+  if (fade) faded_seconds_ = start;
   no_room_ = false;
   work_.clear();
   for (TreeletId id = 0; id < scene_.treelets.size(); ++id) {
     const uint32_t waiting = paths_.waiting(id);
-    batches_.fade(id, kFade);
+    if (fade) batches_.fade(id, kFadeSteps);
     if (waiting > 0) work_.push_back({id, waiting, resident(id)});
   }
   decision_.drain.clear(), decision_.load.clear();

@@ -37,6 +37,7 @@ class UsualBatches {
   void note(TreeletId treelet, uint32_t drained) {
     batches_[treelet].store((of(treelet) + drained) / 2, std::memory_order_relaxed);
   }
+  /// Takes one part in `divisor`, rounded up, from it.
   void fade(TreeletId treelet, uint32_t divisor) {
     const uint32_t usual = of(treelet);
     if (usual > 0) batches_[treelet].store(usual - (usual + divisor - 1) / divisor, std::memory_order_relaxed);
@@ -85,6 +86,7 @@ class TreeletScheduler {
   size_t next_drain_ = 0, next_load_ = 0;
   bool no_room_ = false;         ///< for what the decision wanted: what is resident is worth more
   uint64_t rays_in_memory_ = 0;  ///< left of those that the decision saw
+  double faded_seconds_ = 0;
   double next_decision_seconds_ = 0;  ///< while reads are under way, not before
   std::vector<WaitingTreelet> work_;
   std::vector<PageId> loaded_;
