@@ -74,7 +74,9 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared,
 
 int run_compare(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
-  auto prepared = prepare_render(arguments.render, console);
+  std::vector<Order> orders;
+  for (const std::string& name : arguments.orders) orders.push_back(parse_order(name).value());
+  auto prepared = prepare_render(arguments.render, orders, console);
   if (!prepared.ok()) return console.error(prepared.error());
   auto results = render_orders(arguments, prepared.value(), console);
   if (!results.ok()) return console.error(results.error());

@@ -50,7 +50,7 @@ Status write_outputs(const Arguments& arguments, const PreparedRender& prepared,
 
 int run_render(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
-  auto prepared = prepare_render(arguments.render, console);
+  auto prepared = prepare_render(arguments.render, {arguments.render.execution.order}, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
   RenderHooks hooks = console_hooks(console);

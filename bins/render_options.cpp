@@ -74,6 +74,20 @@ Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& c
   return {};
 }
 
+/// Refuses a cap that cannot work before tables are read. Of several orders each must fit beside the pictures before it.
+Status fit_cap(const PageFile& file, const std::vector<Order>& orders, PreparedRender& prepared) {
+  const uint64_t picture_bytes = uint64_t{prepared.picture.width} * prepared.picture.height * 4 * sizeof(float);
+  MemoryPlan plan;
+  for (const Order order : orders) {
+    ExecutionOptions execution = prepared.execution;
+    execution.order = order;
+    SHOAL_ASSIGN_OR_RETURN(plan, plan_before_tables(posix_file_system(), file, prepared.picture, execution,
+                                                    (orders.size() - 1) * picture_bytes));
+  }
+  prepared.execution.process_bytes = plan.process_bytes;
+  return {};
+}
+
 Result<uint64_t> size_or_zero(const std::string& text) {
   if (text.empty()) return uint64_t{0};
   return parse_size(text);
@@ -201,7 +215,8 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--cache-dir", cache_folder, "where built scenes are kept (default: ~/.cache/shoal)");
 }
 
-Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console& console) {
+Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
+                                      Console& console) {
   PreparedRender prepared;
   prepared.picture = arguments.picture;
   prepared.execution = arguments.execution;
@@ -219,7 +234,9 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console&
     SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, build, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
-  SHOAL_ASSIGN_OR_RETURN(prepared.scene, open_scene(posix_file_system(), path, mode, {arguments.more_levels}));
+  SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
+  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, prepared));
+  SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
   SHOAL_RETURN_IF_ERROR(choose_sky(arguments.environment, prepared, console));
   return prepared;
 }
@@ -246,10 +263,18 @@ RenderHooks console_hooks(Console& console) {
 }
 
 std::string describe_plan(const MemoryPlan& plan) {
-  return fmt::format("memory: cap {}; process {}, film {}, {} paths in flight {}, page cache {} of {}, scratch {}",
-                     format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.film_bytes),
-                     plan.paths_in_flight, format_bytes(plan.paths_bytes), format_bytes(plan.cache_bytes),
-                     format_bytes(plan.scene_page_bytes), format_bytes(plan.scratch_bytes));
+  std::string text = fmt::format("memory: cap {}; process {}, top tree {}, tables {}, film {}",
+                                 format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes),
+                                 format_bytes(plan.top_tree_bytes), format_bytes(plan.table_bytes),
+                                 format_bytes(plan.film_bytes));
+  if (plan.preview_bytes > 0) text += fmt::format(", preview {}", format_bytes(plan.preview_bytes));
+  return text + fmt::format(", {} paths in flight {} and their rays {}, page cache {} of {} (geometry {}, attributes {}, "
+                            "textures {}), read buffers {}, scratch {}",
+                            plan.paths_in_flight, format_bytes(plan.path_state_bytes), format_bytes(plan.ray_bytes),
+                            format_bytes(plan.cache_bytes), format_bytes(plan.scene_page_bytes()),
+                            format_bytes(plan.geometry_page_bytes), format_bytes(plan.attribute_page_bytes),
+                            format_bytes(plan.texture_page_bytes), format_bytes(plan.read_buffer_bytes),
+                            format_bytes(plan.scratch_bytes));
 }
 
 std::string describe_plan(const BuildMemoryPlan& plan) {

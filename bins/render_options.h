@@ -43,8 +43,10 @@ struct PreparedRender {
   PictureOptions picture;
   ExecutionOptions execution;
 };
-/// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment.
-Result<PreparedRender> prepare_render(const RenderArguments& arguments, Console& console);
+/// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment. The cap must
+/// fit every one of `orders`, whose pictures are kept.
+Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
+                                      Console& console);
 
 /// Becomes true at SIGINT or SIGTERM, from this call on.
 const std::atomic<bool>* stop_on_signals();

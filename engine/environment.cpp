@@ -32,9 +32,8 @@ Environment::Environment(ImageF image) : image_(std::move(image)) {
   }
   // The mean of the bilinear interpolant over each texel (1/8, 6/8, 1/8 a side): a dark texel beside a bright
   // one is not dark.
-  std::vector<double> weights(static_cast<size_t>(width) * height);
   double sum = 0, sine_sum = 0;
-  for (uint32_t y = 0; y < height; ++y) {
+  distribution_ = Distribution2D(width, height, [&](uint32_t y, std::span<double> weights) {
     const double sine = sin_cos(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(height)).sin;
     const uint32_t rows[3] = {y == 0 ? 0 : y - 1, y, std::min(y + 1, height - 1)};
     for (uint32_t x = 0; x < width; ++x) {
@@ -45,12 +44,11 @@ Environment::Environment(ImageF image) : image_(std::move(image)) {
           mean += (i == 1 ? 0.75 : 0.125) * (j == 1 ? 0.75 : 0.125) * luminance(texel(columns[i], rows[j]));
         }
       }
-      weights[static_cast<size_t>(y) * width + x] = mean * sine;
+      weights[x] = mean * sine;
       sum += mean * sine, sine_sum += sine;
     }
-  }
+  });
   mean_luminance_ = static_cast<float>(sum / sine_sum);
-  distribution_ = Distribution2D(weights, width, height);
 }
 
 Vec3 Environment::texel(uint32_t x, uint32_t y) const {

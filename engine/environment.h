@@ -16,8 +16,6 @@
 
 namespace shoal {
 
-inline constexpr uint64_t kMaxEnvironmentPixels = uint64_t{1} << 26;
-
 class Environment {
  public:
   Environment() = default;  ///< black

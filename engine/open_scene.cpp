@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <numeric>
 #include <type_traits>
 
@@ -18,23 +17,25 @@ constexpr uint64_t kMaxTextBytes = 64u << 20;
 template <class T>
 Result<std::vector<T>> read_rows(const PageFile& file, TableId table, const char* name) {
   static_assert(std::is_trivially_copyable_v<T>);
-  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, memory_limit_bytes() / 4));
-  if (bytes.size() % sizeof(T) != 0) {
+  SHOAL_ASSIGN_OR_RETURN(const uint64_t bytes, file.table_bytes(table, memory_limit_bytes() / 4));
+  if (bytes % sizeof(T) != 0) {
     return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected rows of {} bytes, found {} bytes",
-                                                  file.path(), name, sizeof(T), bytes.size())};
+                                                  file.path(), name, sizeof(T), bytes)};
   }
-  if (bytes.size() / sizeof(T) >= kNoIndex) {
+  if (bytes / sizeof(T) >= kNoIndex) {
     return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}: expected at most {} rows, found {}",
-                                                  file.path(), name, kNoIndex - 1, bytes.size() / sizeof(T))};
+                                                  file.path(), name, kNoIndex - 1, bytes / sizeof(T))};
   }
-  std::vector<T> rows(bytes.size() / sizeof(T));
-  if (!bytes.empty()) std::memcpy(static_cast<void*>(rows.data()), bytes.data(), bytes.size());
+  std::vector<T> rows(bytes / sizeof(T));
+  SHOAL_RETURN_IF_ERROR(file.read_table_into(table, {reinterpret_cast<std::byte*>(rows.data()), bytes}));
   return rows;
 }
 
 Result<std::string> read_text(const PageFile& file, TableId table) {
-  SHOAL_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, file.read_table(table, kMaxTextBytes));
-  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  SHOAL_ASSIGN_OR_RETURN(const uint64_t bytes, file.table_bytes(table, kMaxTextBytes));
+  std::string text(bytes, '\0');
+  SHOAL_RETURN_IF_ERROR(file.read_table_into(table, std::as_writable_bytes(std::span(text))));
+  return text;
 }
 
 Status read_top_tree(const PageFile& file, uint32_t treelet_count, TraversalOptions traversal, Scene& scene) {
@@ -56,13 +57,18 @@ Status read_top_tree(const PageFile& file, uint32_t treelet_count, TraversalOpti
 }  // namespace
 
 Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode, TraversalOptions traversal) {
+  SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<PageFile> file, PageFile::open(fs, path, mode));
+  return read_scene(std::move(file), traversal);
+}
+
+Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions traversal) {
   Scene scene;
-  SHOAL_ASSIGN_OR_RETURN(scene.file, PageFile::open(fs, path, mode));
+  scene.file = std::move(page_file);
   const PageFile& file = *scene.file;
   SHOAL_ASSIGN_OR_RETURN(const auto headers, read_rows<SceneHeader>(file, tables::kSceneHeader, "scene headers"));
   if (headers.size() != 1) {
     return Error{ErrorCode::kCorrupt,
-                 fmt::format("{}: table of scene headers: expected 1 row, found {}", path, headers.size())};
+                 fmt::format("{}: table of scene headers: expected 1 row, found {}", file.path(), headers.size())};
   }
   scene.header = headers[0];
   SHOAL_ASSIGN_OR_RETURN(scene.treelets, read_rows<TreeletPages>(file, tables::kTreelets, "treelets"));

@@ -23,8 +23,11 @@ class QueuedPaths {
         path_count_(path_count) {}
 
   static uint64_t bytes(uint32_t treelet_count, uint32_t path_count, unsigned threads) {
-    return uint64_t{path_count} * sizeof(PathState) + TreeletQueues::bytes(treelet_count, path_count, threads) +
-           PathLists::bytes(treelet_count, path_count);
+    return state_bytes(treelet_count, path_count) + TreeletQueues::bytes(treelet_count, path_count, threads);
+  }
+  /// Of `bytes`, what is not rays and their queues.
+  static uint64_t state_bytes(uint32_t treelet_count, uint32_t path_count) {
+    return uint64_t{path_count} * sizeof(PathState) + PathLists::bytes(treelet_count, path_count);
   }
 
   PathState& state(uint32_t path) { return states_[path]; }

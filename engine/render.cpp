@@ -53,7 +53,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   ExecutionOptions execution = asked;
   if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
   SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading));
-  SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, picture, execution));
+  SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, *tables, picture, execution));
+  execution.paging.read_depth = plan.read_depth;
   if (hooks.planned) hooks.planned(plan);
 
   const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera],

@@ -1,4 +1,4 @@
-// Rendering: options, the plan for memory, and the two orders over the same treelets, pages and kernels.
+// Rendering: options, and the two orders over the same treelets, pages and kernels.
 // Called by bins and tests. The picture depends on the scene and on PictureOptions only; everything in
 // ExecutionOptions changes time and traffic, never a bit.
 #pragma once
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/counters.h"
+#include "engine/memory_plan.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
 #include "io/page_loader.h"
@@ -32,6 +33,7 @@ struct ExecutionOptions {
   Order order = Order::kQueued;
   unsigned threads = 0;             ///< 0: all
   uint64_t max_memory_bytes = 0;    ///< of the whole process; 0: 70 % of the smaller of memory and cgroup limit
+  uint64_t process_bytes = 0;       ///< of plan_before_tables(), so that every plan says the same; 0: measured
   uint64_t page_cache_bytes = 0;    ///< 0: from the plan
   uint64_t rays_in_flight = 0;      ///< 0: from the plan; rounded up to one block
   std::string policy = "resident-first";
@@ -39,25 +41,6 @@ struct ExecutionOptions {
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
 };
-
-/// Where the memory of a render goes; made before anything is allocated, printed before work starts.
-struct MemoryPlan {
-  uint64_t cap_bytes = 0;
-  uint64_t process_bytes = 0;   ///< resident before: program, libraries, scene tables, shading tables
-  uint64_t film_bytes = 0;      ///< sums, and the picture while it is written
-  uint64_t paths_bytes = 0;     ///< path states, their rays, queues
-  uint64_t cache_bytes = 0;     ///< pages of geometry, attributes and textures
-  uint64_t scratch_bytes = 0;   ///< stacks, read buffers, the cache's bookkeeping, the allocator's slack
-  uint32_t paths_in_flight = 0;
-  uint64_t scene_page_bytes = 0;  ///< all pages decoded: what the cache would hold if it could
-
-  uint64_t total_bytes() const {
-    return process_bytes + film_bytes + paths_bytes + cache_bytes + scratch_bytes;
-  }
-};
-
-/// Fails with: kMemoryCap (the message names the smallest cap that would work), kUsage.
-Result<MemoryPlan> plan_memory(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution);
 
 struct RenderProgress {
   uint64_t samples_done = 0, samples_total = 0;

@@ -65,11 +65,25 @@ Json machine_json() {
 }
 
 Json plan_json(const MemoryPlan& plan) {
-  return {{"cap_bytes", plan.cap_bytes},         {"process_bytes", plan.process_bytes},
-          {"film_bytes", plan.film_bytes},       {"paths_bytes", plan.paths_bytes},
-          {"cache_bytes", plan.cache_bytes},     {"scratch_bytes", plan.scratch_bytes},
-          {"total_bytes", plan.total_bytes()},   {"paths_in_flight_count", plan.paths_in_flight},
-          {"scene_page_bytes", plan.scene_page_bytes}};
+  return {{"cap_bytes", plan.cap_bytes},
+          {"process_bytes", plan.process_bytes},
+          {"top_tree_bytes", plan.top_tree_bytes},
+          {"table_bytes", plan.table_bytes},
+          {"film_bytes", plan.film_bytes},
+          {"preview_bytes", plan.preview_bytes},
+          {"path_state_bytes", plan.path_state_bytes},
+          {"ray_bytes", plan.ray_bytes},
+          {"paths_bytes", plan.paths_bytes()},
+          {"cache_bytes", plan.cache_bytes},
+          {"read_buffer_bytes", plan.read_buffer_bytes},
+          {"scratch_bytes", plan.scratch_bytes},
+          {"total_bytes", plan.total_bytes()},
+          {"paths_in_flight_count", plan.paths_in_flight},
+          {"read_depth_count", plan.read_depth},
+          {"scene_page_bytes", plan.scene_page_bytes()},
+          {"geometry_page_bytes", plan.geometry_page_bytes},
+          {"attribute_page_bytes", plan.attribute_page_bytes},
+          {"texture_page_bytes", plan.texture_page_bytes}};
 }
 
 Json options_json(const PictureOptions& picture, const ExecutionOptions& execution) {

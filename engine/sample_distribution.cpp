@@ -40,10 +40,18 @@ size_t Distribution1D::sample(double u, double* remainder) const {
 }
 
 Distribution2D::Distribution2D(std::span<const double> weights, uint32_t width, uint32_t height)
+    : Distribution2D(width, height, [&](uint32_t y, std::span<double> row) {
+        std::copy_n(weights.begin() + static_cast<ptrdiff_t>(static_cast<size_t>(y) * width), width, row.begin());
+      }) {}
+
+Distribution2D::Distribution2D(uint32_t width, uint32_t height,
+                               const std::function<void(uint32_t, std::span<double>)>& row)
     : width_(width), height_(height) {
-  std::vector<double> sums;
+  std::vector<double> weights(width), sums;
+  columns_.reserve(height);
   for (uint32_t y = 0; y < height; ++y) {
-    columns_.emplace_back(weights.subspan(static_cast<size_t>(y) * width, width));
+    row(y, weights);
+    columns_.emplace_back(weights);
     sums.push_back(columns_.back().total());
   }
   rows_ = Distribution1D(sums);

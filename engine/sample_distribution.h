@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -40,6 +41,8 @@ class Distribution2D {
   Distribution2D() = default;
   /// `weights` row by row, width * height of them.
   Distribution2D(std::span<const double> weights, uint32_t width, uint32_t height);
+  /// `row(y, weights)` sets the weights of a row: they are never all in memory beside what is kept.
+  Distribution2D(uint32_t width, uint32_t height, const std::function<void(uint32_t, std::span<double>)>& row);
 
   double total() const { return rows_.total(); }
   /// Requires: total() > 0.

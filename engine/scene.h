@@ -31,6 +31,8 @@ struct Scene {
 
 /// Fails with: kInput (missing, not a .shoal), kCorrupt (file, place, expected, found).
 Result<Scene> open_scene(FileSystem& fs, const std::string& path, ReadMode mode, TraversalOptions traversal);
+/// The tables of an opened file. Fails with: kCorrupt.
+Result<Scene> read_scene(std::unique_ptr<PageFile> file, TraversalOptions traversal);
 
 /// The check that the page cache runs on every decoded page (treelet, attribute and texture pages): the page is
 /// well formed and fits the scene's tables (triangle counts, materials, the roots that the top tree enters), so

@@ -25,6 +25,8 @@ struct EnvironmentOptions {
   std::string path;
 };
 
+inline constexpr uint64_t kMaxEnvironmentPixels = uint64_t{1} << 26;
+
 struct ShadingOptions {
   /// Scattering events a path may have. Vertex k (PathState::bounce == k; the camera ray's hit is 0) sends a shadow
   /// ray and a bounce only when k < bounces. 0: emission seen by the camera; 1: direct light; 2: one indirect

@@ -114,7 +114,7 @@ std::string look_at(const std::string& name, const std::string& type, HeaderByte
   return {};
 }
 
-Status check_sizes(const std::string& path, const Seen& seen, uint64_t max_pixels) {
+Result<ExrSize> check_sizes(const std::string& path, const Seen& seen, uint64_t max_pixels) {
   if (!seen.data_window || !seen.display_window || !seen.channel_count || !seen.compression) {
     return Error{ErrorCode::kInput, fmt::format("{}: EXR header: expected dataWindow, displayWindow, channels and "
                                                 "compression, found not all of them",
@@ -130,7 +130,8 @@ Status check_sizes(const std::string& path, const Seen& seen, uint64_t max_pixel
                              "{} of {} channels",
                              path, max_pixels, width, height, *seen.channel_count)};
   }
-  return {};
+  return ExrSize{static_cast<uint32_t>(width), static_cast<uint32_t>(height),
+                 static_cast<uint32_t>(*seen.channel_count)};
 }
 
 }  // namespace
@@ -141,7 +142,7 @@ bool is_exr(ReadableFile& file) {
          magic == kMagic;
 }
 
-Status check_exr_header(ReadableFile& file, uint64_t max_pixels) {
+Result<ExrSize> check_exr_header(ReadableFile& file, uint64_t max_pixels) {
   const auto bad = [&](const std::string& message) {
     return Error{ErrorCode::kInput, fmt::format("{}: EXR header: {}", file.path(), message)};
   };

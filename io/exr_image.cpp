@@ -112,6 +112,42 @@ ExrImage read_checked(Imf::InputFile& input) {
   return image;
 }
 
+ImageF read_rgb(Imf::InputFile& input) {
+  const Imf::ChannelList& channels = input.header().channels();
+  const bool gray = channels.findChannel("R") == nullptr && channels.findChannel("Y") != nullptr;
+  const Imath::Box2i data = input.header().dataWindow();
+  ImageF image;
+  image.width = static_cast<uint32_t>(data.max.x - data.min.x) + 1;
+  image.height = static_cast<uint32_t>(data.max.y - data.min.y) + 1;
+  image.rgb.resize(uint64_t{3} * image.width * image.height);
+  Imf::FrameBuffer frame;
+  constexpr size_t kStride = 3 * sizeof(float);
+  for (size_t c = 0; c < (gray ? 1 : 3); ++c) {
+    static constexpr const char* kNames[] = {"R", "G", "B"};
+    const char* name = gray ? "Y" : kNames[c];
+    if (channels.findChannel(name) == nullptr) throw Iex::ArgExc("expected channels R, G and B, or Y, found others");
+    frame.insert(name, Imf::Slice::Make(Imf::FLOAT, image.rgb.data() + c, data, kStride, kStride * image.width));
+  }
+  input.setFrameBuffer(frame);
+  input.readPixels(data.min.y, data.max.y);
+  for (size_t i = 0; gray && i < image.rgb.size(); i += 3) image.rgb[i + 1] = image.rgb[i + 2] = image.rgb[i];
+  return image;
+}
+
+/// `read` over the opened file; what the library throws becomes an Error.
+template <class T>
+Result<T> read_file(FileSystem& fs, const std::string& path, uint64_t max_pixels, T (*read)(Imf::InputFile&)) {
+  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
+  SHOAL_RETURN_IF_ERROR(check_exr_header(*file, max_pixels));
+  try {
+    ExrInput stream(*file);
+    Imf::InputFile input(stream, 0);
+    return read(input);
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInput, fmt::format("{}: expected an OpenEXR, found: {}", path, e.what())};
+  }
+}
+
 }  // namespace
 
 Status write_exr(FileSystem& fs, const std::string& path, const ExrImage& image) {
@@ -133,15 +169,11 @@ Status write_exr(FileSystem& fs, const std::string& path, const ExrImage& image)
 }
 
 Result<ExrImage> read_exr(FileSystem& fs, const std::string& path, uint64_t max_pixels) {
-  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
-  SHOAL_RETURN_IF_ERROR(check_exr_header(*file, max_pixels));
-  try {
-    ExrInput stream(*file);
-    Imf::InputFile input(stream, 0);
-    return read_checked(input);
-  } catch (const std::exception& e) {
-    return Error{ErrorCode::kInput, fmt::format("{}: expected an OpenEXR, found: {}", path, e.what())};
-  }
+  return read_file(fs, path, max_pixels, read_checked);
+}
+
+Result<ImageF> read_exr_rgb(FileSystem& fs, const std::string& path, uint64_t max_pixels) {
+  return read_file(fs, path, max_pixels, read_rgb);
 }
 
 }  // namespace shoal

@@ -16,29 +16,8 @@ namespace {
 /// An .hdr cannot be larger than its pixels and a header, whatever its run lengths.
 constexpr uint64_t kMaxHeaderBytes = 1u << 20;
 
-const ExrChannel* find_channel(const ExrImage& image, const char* name) {
-  const auto it = std::find_if(image.channels.begin(), image.channels.end(),
-                               [&](const ExrChannel& channel) { return channel.name == name; });
-  return it == image.channels.end() ? nullptr : &*it;
-}
-
-Result<ImageF> rgb_of(const ExrImage& exr, const std::string& path) {
-  const ExrChannel* channels[3] = {find_channel(exr, "R"), find_channel(exr, "G"), find_channel(exr, "B")};
-  if (const ExrChannel* y = find_channel(exr, "Y"); y != nullptr && channels[0] == nullptr) {
-    std::fill(std::begin(channels), std::end(channels), y);
-  }
-  for (const ExrChannel* channel : channels) {
-    if (channel == nullptr) {
-      return Error{ErrorCode::kInput, fmt::format("{}: channels: expected R, G and B, or Y, found others", path)};
-    }
-  }
-  ImageF image{exr.width, exr.height, std::vector<float>(uint64_t{3} * exr.width * exr.height)};
-  for (size_t c = 0; c < 3; ++c) {
-    const std::vector<float>& values = channels[c]->values;
-    for (size_t i = 0; i < values.size(); ++i) image.rgb[3 * i + c] = values[i];
-  }
-  return image;
-}
+/// What OpenEXR holds of a file while it reads: blocks of at most 32 lines, stored and decoded, of 4 bytes a value.
+constexpr uint64_t kExrBlockLines = 32, kExrBlockCopies = 4;
 
 }  // namespace
 
@@ -51,8 +30,8 @@ Result<Image8> decode_image(std::span<const std::byte> bytes, const std::string&
 Result<ImageF> read_hdr_image(FileSystem& fs, const std::string& path, uint64_t max_pixels) {
   SHOAL_ASSIGN_OR_RETURN(auto file, fs.open(path, ReadMode::kBuffered));
   if (is_exr(*file)) {
-    SHOAL_ASSIGN_OR_RETURN(const ExrImage exr, read_exr(fs, path, max_pixels));
-    return rgb_of(exr, path);
+    file.reset();
+    return read_exr_rgb(fs, path, max_pixels);
   }
   file.reset();
   const uint64_t limit_bytes = kMaxHeaderBytes + std::min(max_pixels, uint64_t{1} << 40) * 8;
@@ -60,6 +39,26 @@ Result<ImageF> read_hdr_image(FileSystem& fs, const std::string& path, uint64_t 
   const auto bytes = std::as_bytes(std::span(text));
   if (is_radiance(bytes)) return decode_radiance(bytes, path, max_pixels);
   return Error{ErrorCode::kInput, fmt::format("{}: expected a Radiance .hdr or an OpenEXR, found neither", path)};
+}
+
+Result<HdrImageSize> hdr_image_size(FileSystem& fs, const std::string& path, uint64_t max_pixels) {
+  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
+  HdrImageSize size;
+  uint64_t beside = 0;
+  if (is_exr(*file)) {
+    SHOAL_ASSIGN_OR_RETURN(const ExrSize exr, check_exr_header(*file, max_pixels));
+    size.width = exr.width, size.height = exr.height;
+    beside = uint64_t{exr.width} * exr.channel_count * 4 * kExrBlockLines * kExrBlockCopies + kMaxHeaderBytes;
+  } else {
+    std::string start(std::min(file->size_bytes(), kMaxHeaderBytes), '\0');
+    SHOAL_RETURN_IF_ERROR(file->read_at(0, std::as_writable_bytes(std::span(start))));
+    SHOAL_ASSIGN_OR_RETURN(const ImageF empty, decode_radiance_header(std::as_bytes(std::span(start)), path, max_pixels));
+    size.width = empty.width, size.height = empty.height;
+    beside = file->size_bytes();  // the whole file, while it is decoded
+  }
+  size.kept_bytes = uint64_t{size.width} * size.height * 3 * sizeof(float);
+  size.peak_bytes = size.kept_bytes + beside;
+  return size;
 }
 
 }  // namespace shoal

@@ -33,6 +33,13 @@ struct ImageF {
 
 /// Radiance .hdr (RGBE, flat and run-length) or OpenEXR, by content. Fails with: kInput.
 Result<ImageF> read_hdr_image(FileSystem& fs, const std::string& path, uint64_t max_pixels);
+/// What read_hdr_image() will take, from the header: `kept_bytes` of the result, and `peak_bytes` at most while it reads.
+struct HdrImageSize {
+  uint32_t width = 0, height = 0;
+  uint64_t kept_bytes = 0, peak_bytes = 0;
+};
+/// Fails with: kInput.
+Result<HdrImageSize> hdr_image_size(FileSystem& fs, const std::string& path, uint64_t max_pixels);
 
 /// A named channel of an EXR: `R`, `albedo.R`, `normal.X`, `Z`, `sampleCount.Y`.
 struct ExrChannel {
@@ -51,6 +58,8 @@ struct ExrImage {
 };
 /// One part, ZIP, atomically. Fails with: kStorage.
 Status write_exr(FileSystem& fs, const std::string& path, const ExrImage& image);
+/// R, G and B alone, or Y three times, straight into their place. Fails with: kInput.
+Result<ImageF> read_exr_rgb(FileSystem& fs, const std::string& path, uint64_t max_pixels);
 /// Fails with: kInput.
 Result<ExrImage> read_exr(FileSystem& fs, const std::string& path, uint64_t max_pixels);
 

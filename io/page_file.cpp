@@ -98,7 +98,7 @@ const TableRange* PageFile::find_table(TableId table) const {
 
 bool PageFile::has_table(TableId table) const { return find_table(table) != nullptr; }
 
-Result<std::vector<std::byte>> PageFile::read_table(TableId table, uint64_t limit_bytes) const {
+Result<uint64_t> PageFile::table_bytes(TableId table, uint64_t limit_bytes) const {
   const TableRange* range = find_table(table);
   if (range == nullptr) {
     return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: table {} is absent", path_, table)};
@@ -107,13 +107,25 @@ Result<std::vector<std::byte>> PageFile::read_table(TableId table, uint64_t limi
     return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: table {}: expected at most {} bytes, found {}",
                                                   path_, table, limit_bytes, range->bytes)};
   }
-  std::vector<std::byte> bytes(range->bytes);
-  auto rest = std::span(bytes);
+  return range->bytes;
+}
+
+Status PageFile::read_table_into(TableId table, std::span<std::byte> out) const {
+  const TableRange* range = find_table(table);
+  SHOAL_CHECK(range != nullptr && range->bytes == out.size());
+  auto rest = out;
   for (PageId id = range->first_page; id < range->first_page + range->page_count; ++id) {
     uint64_t read_bytes = 0;
     SHOAL_RETURN_IF_ERROR(read_page(id, rest.first(records_[id].raw_bytes), &read_bytes));
     rest = rest.subspan(records_[id].raw_bytes);
   }
+  return {};
+}
+
+Result<std::vector<std::byte>> PageFile::read_table(TableId table, uint64_t limit_bytes) const {
+  SHOAL_ASSIGN_OR_RETURN(const uint64_t size, table_bytes(table, limit_bytes));
+  std::vector<std::byte> bytes(size);
+  SHOAL_RETURN_IF_ERROR(read_table_into(table, bytes));
   return bytes;
 }
 

@@ -106,6 +106,9 @@ class PageFile {
   /// The whole of a table; empty when it was stored empty. Fails with: kCorrupt when it is absent or larger
   /// than `limit_bytes`.
   Result<std::vector<std::byte>> read_table(TableId table, uint64_t limit_bytes) const;
+  /// The same straight into its place, so that it is in memory once: its size first, then exactly so many bytes.
+  Result<uint64_t> table_bytes(TableId table, uint64_t limit_bytes) const;
+  Status read_table_into(TableId table, std::span<std::byte> out) const;
   bool has_table(TableId table) const;
   /// Reads every byte of the file: checksums, padding that must be zero, gaps. Stops at the first damage.
   /// Fails with: kStorage, kCorrupt.

@@ -106,17 +106,12 @@ float scale_of(uint8_t exponent) {
   return scale;
 }
 
-}  // namespace
-
-bool is_radiance(std::span<const std::byte> bytes) {
-  return bytes.size() >= 2 && bytes[0] == std::byte{'#'} && bytes[1] == std::byte{'?'};
+Error wrong(const std::string& name, std::string_view expected, std::string_view found) {
+  return {ErrorCode::kInput, fmt::format("{}: expected {}, found {}", name, expected, found)};
 }
 
-Result<ImageF> decode_radiance(std::span<const std::byte> data, const std::string& name, uint64_t max_pixels) {
-  const auto bad = [&](std::string_view expected, std::string_view found) {
-    return Error{ErrorCode::kInput, fmt::format("{}: expected {}, found {}", name, expected, found)};
-  };
-  Bytes bytes(data);
+Result<ImageF> read_header(Bytes& bytes, const std::string& name, uint64_t max_pixels) {
+  const auto bad = [&](std::string_view expected, std::string_view found) { return wrong(name, expected, found); };
   std::string line;
   if (!bytes.take_line(line)) return bad("a Radiance header", "its end");
   do {
@@ -133,11 +128,31 @@ Result<ImageF> decode_radiance(std::span<const std::byte> data, const std::strin
   if (pixels > max_pixels) {
     return bad(fmt::format("at most {} pixels", max_pixels), fmt::format("{} x {}", image.width, image.height));
   }
+  return image;
+}
+
+}  // namespace
+
+bool is_radiance(std::span<const std::byte> bytes) {
+  return bytes.size() >= 2 && bytes[0] == std::byte{'#'} && bytes[1] == std::byte{'?'};
+}
+
+Result<ImageF> decode_radiance_header(std::span<const std::byte> data, const std::string& name, uint64_t max_pixels) {
+  Bytes bytes(data);
+  if (!is_radiance(data)) return wrong(name, "a Radiance .hdr or an OpenEXR", "neither");
+  return read_header(bytes, name, max_pixels);
+}
+
+Result<ImageF> decode_radiance(std::span<const std::byte> data, const std::string& name, uint64_t max_pixels) {
+  Bytes bytes(data);
+  SHOAL_ASSIGN_OR_RETURN(ImageF image, read_header(bytes, name, max_pixels));
+  // Address space alone: memory comes with the rows, so a header cannot ask for it on its own.
+  image.rgb.reserve(uint64_t{3} * image.width * image.height);
   std::array<float, 256> scales;
   for (unsigned e = 0; e < 256; ++e) scales[e] = scale_of(static_cast<uint8_t>(e));
   std::vector<Rgbe> row(image.width);
   for (uint32_t y = 0; y < image.height; ++y) {
-    if (!read_row(bytes, row)) return bad("whole rows of pixels", fmt::format("row {} broken or cut off", y));
+    if (!read_row(bytes, row)) return wrong(name, "whole rows of pixels", fmt::format("row {} broken or cut off", y));
     for (const Rgbe& pixel : row) {
       for (size_t c = 0; c < 3; ++c) image.rgb.push_back(static_cast<float>(pixel[c]) * scales[pixel[3]]);
     }
