@@ -72,7 +72,7 @@ Row run_row(const Arguments& arguments, const Scene& scene, Order order, double 
   ExecutionOptions execution;
   execution.order = order;
   execution.threads = std::max(1u, std::thread::hardware_concurrency());
-  const uint64_t pages = value_or_stop(plan_memory(scene, picture, execution)).scene_page_bytes;
+  const uint64_t pages = decoded_page_bytes(*scene.file);
   execution.page_cache_bytes = std::max(static_cast<uint64_t>(static_cast<double>(pages) * share),
                                         PageCache::minimum_capacity_bytes(*scene.file, execution.threads));
   for (int run = 0; run < arguments.runs; ++run) {

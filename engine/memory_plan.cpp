@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <thread>
 
 #include "engine/film.h"
@@ -148,6 +149,11 @@ uint64_t size_of(const PageFile& file, TableId table) {
 }
 
 }  // namespace
+
+uint64_t decoded_page_bytes(const PageFile& file) {
+  const PageSizes sizes = page_sizes(file);
+  return std::accumulate(std::begin(sizes.sum), std::end(sizes.sum), uint64_t{0});
+}
 
 Result<MemoryPlan> plan_memory(const Scene& scene, const ShadingTables& tables, const PictureOptions& picture,
                                const ExecutionOptions& execution) {

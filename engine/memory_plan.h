@@ -44,6 +44,9 @@ struct MemoryPlan {
   }
 };
 
+/// All pages of geometry, attributes and textures decoded: what a cache would hold that could.
+uint64_t decoded_page_bytes(const PageFile& file);
+
 /// The plan of a render whose tables are in memory.
 /// Fails with: kMemoryCap (the message names the smallest cap that would work).
 Result<MemoryPlan> plan_memory(const Scene& scene, const ShadingTables& tables, const PictureOptions& picture,
