@@ -94,14 +94,15 @@ int open_nameless(const std::string& folder, int extra_flags) {
   return named;
 }
 
-/// Takes the room now. Where the file system cannot, its free space is all that can be asked. False with errno.
+/// Takes the room now; false with errno. Asks for the free space first: a file system may take all that is left before
+/// it finds out that this is not enough, and others would meet a full disk meanwhile.
 bool take_room(int fd, uint64_t bytes) {
   if (bytes == 0) return true;
+  struct statvfs info {};
+  if (::fstatvfs(fd, &info) == 0 && uint64_t{info.f_bavail} * info.f_frsize < bytes) return errno = ENOSPC, false;
   while (::fallocate(fd, 0, 0, static_cast<off_t>(bytes)) != 0) {
     if (errno == EINTR) continue;
     if (errno != EOPNOTSUPP && errno != ENOSYS) return false;
-    struct statvfs info {};
-    if (::fstatvfs(fd, &info) == 0 && uint64_t{info.f_bavail} * info.f_frsize < bytes) return errno = ENOSPC, false;
     return ::ftruncate(fd, static_cast<off_t>(bytes)) == 0;
   }
   return true;
