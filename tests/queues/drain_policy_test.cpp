@@ -36,7 +36,7 @@ TEST(DrainPolicy, EveryNamedPolicyDrainsWorkWhenNoMoreIsComingAndNothingCanBeRea
 
 TEST(DrainPolicy, EveryNamedPolicyDrainsOrLoadsWorkWhenReadingAhead) {
   for (const std::string_view name : drain_policy_names()) {
-    const auto policy = make_drain_policy(name, {});
+    const auto policy = make_drain_policy(name, {.rays_ahead = 1000});
     const Decision decision = decide(*policy, work({0, 0, 3, 0}), false);
     EXPECT_FALSE(decision.drain.empty() && decision.load.empty()) << name;
     EXPECT_EQ(decision.load, Ids{2}) << name;
