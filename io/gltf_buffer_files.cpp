@@ -17,7 +17,7 @@ Result<ReadableFile*> BufferFiles::open(uint32_t buffer) {
     files_[open_buffers_.front()].reset();
     open_buffers_.erase(open_buffers_.begin());
   }
-  SHOAL_ASSIGN_OR_RETURN(auto file, fs_->open(source.path, ReadMode::kBuffered));
+  SHOAL_ASSIGN_OR_RETURN(auto file, fs_->open(source.path, ReadMode::kDirect));
   const uint64_t size = file->size_bytes();
   if (source.path_offset > size || source.byte_length > size - source.path_offset) {
     return Error{

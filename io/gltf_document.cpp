@@ -16,7 +16,7 @@ struct Source {
 };
 
 Result<Source> read_source(FileSystem& fs, const std::string& path, const Limits& limits) {
-  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
+  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kDirect));
   SHOAL_ASSIGN_OR_RETURN(const auto chunks, find_glb_chunks(*file));
   const FileRange range = chunks ? chunks->json : FileRange{0, file->size_bytes()};
   if (range.bytes > limits.json_bytes) {
