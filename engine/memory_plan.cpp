@@ -169,6 +169,7 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const ShadingTables& tables, 
 
 Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, const PictureOptions& picture,
                                       const ExecutionOptions& execution, uint64_t kept_bytes) {
+  SHOAL_RETURN_IF_ERROR(check_picture(picture));
   SceneSizes sizes{file};
   sizes.treelet_count = static_cast<uint32_t>(size_of(file, tables::kTreelets) / sizeof(TreeletPages));
   for (const TableId table : {tables::kTopNodes, tables::kEntries, tables::kInstances}) {

@@ -54,7 +54,7 @@ Result<MemoryPlan> plan_memory(const Scene& scene, const ShadingTables& tables, 
 
 /// The same before the tables are read, from the sizes in the directory and in the environment's header. Nothing is
 /// larger afterwards than it says, so a cap that passes here passes plan_memory() too, given `process_bytes` of this
-/// plan as ExecutionOptions::process_bytes. Fails with: kMemoryCap, kInput (environment), kCorrupt.
+/// plan as ExecutionOptions::process_bytes. Fails with: kMemoryCap, kUsage (a picture of no size), kInput (environment).
 /// `kept_bytes`: what the caller will hold beside this render.
 Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, const PictureOptions& picture,
                                       const ExecutionOptions& execution, uint64_t kept_bytes = 0);

@@ -17,17 +17,7 @@ namespace {
 constexpr uint64_t kTextureTileWork = 64;
 
 Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
-  if (picture.width == 0 || picture.height == 0 || picture.width > 65536 || picture.height > 65536 ||
-      uint64_t{picture.width} * picture.height >= (1ull << 31)) {
-    return Error{ErrorCode::kUsage, fmt::format("a picture of {} x {} pixels: each side must be 1 to 65536, the area "
-                                                "below 2^31", picture.width, picture.height)};
-  }
-  if (picture.samples == 0 || picture.samples > (1u << 22)) {
-    return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
-  }
-  if (picture.tile_sample == 0) {
-    return Error{ErrorCode::kUsage, "one in 0 tiles: must be at least one in 1"};
-  }
+  SHOAL_RETURN_IF_ERROR(check_picture(picture));
   const size_t cameras = std::max<size_t>(scene.cameras.size(), 1);
   if (picture.camera >= cameras) {
     return Error{ErrorCode::kUsage,
@@ -45,6 +35,21 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
 }
 
 }  // namespace
+
+Status check_picture(const PictureOptions& picture) {
+  if (picture.width == 0 || picture.height == 0 || picture.width > 65536 || picture.height > 65536 ||
+      uint64_t{picture.width} * picture.height >= (1ull << 31)) {
+    return Error{ErrorCode::kUsage, fmt::format("a picture of {} x {} pixels: each side must be 1 to 65536, the area "
+                                                "below 2^31", picture.width, picture.height)};
+  }
+  if (picture.samples == 0 || picture.samples > (1u << 22)) {
+    return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
+  }
+  if (picture.tile_sample == 0) {
+    return Error{ErrorCode::kUsage, "one in 0 tiles: must be at least one in 1"};
+  }
+  return {};
+}
 
 Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
                             const ExecutionOptions& asked, const RenderHooks& hooks) {

@@ -64,6 +64,9 @@ struct RenderResult {
   double picture_share = 1;  ///< of the pixels, that were rendered (PictureOptions::tile_sample)
 };
 
+/// Sizes and samples that can be rendered. Fails with: kUsage.
+Status check_picture(const PictureOptions& picture);
+
 /// Renders and checks the counters' identities. Fails with: kInternal (they do not balance), kCorrupt, kStorage,
 /// kMemoryCap, kStopped, kInput (environment).
 Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
