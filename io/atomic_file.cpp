@@ -84,7 +84,7 @@ Status AtomicFile::commit() {
 }
 
 Result<std::string> read_whole_file(FileSystem& fs, const std::string& path, uint64_t limit_bytes) {
-  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
+  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kDirect));
   if (file->size_bytes() > limit_bytes) {
     return Error{ErrorCode::kInput, fmt::format("{} is too large: expected at most {} bytes, found {}", path,
                                                 limit_bytes, file->size_bytes())};

@@ -112,7 +112,7 @@ class AtomicFile {
   uint64_t size_bytes_ = 0;
 };
 
-/// The whole of a small file. Fails with: kInput when larger than `limit_bytes`.
+/// The whole of a file, read directly. Fails with: kInput when larger than `limit_bytes`.
 Result<std::string> read_whole_file(FileSystem& fs, const std::string& path, uint64_t limit_bytes);
 /// Writes a small file atomically.
 Status write_whole_file(FileSystem& fs, const std::string& path, std::span<const std::byte> bytes);

@@ -1,7 +1,8 @@
 // Accessors as streams of floats or indices, read in bounded chunks from the file: a buffer is never held whole nor
 // mapped. Handles every component type, stride, normalised integers, sparse values and missing views.
 // Called by engine/build_scene. Thread rule: a BufferFiles and its readers belong to one thread; a document may be
-// shared. Cost: one pread a block (kBlockBytes), one conversion a value; at most kChunkBytes of memory a reader.
+// shared. Cost: one read of a block (kBlockBytes; larger in sequence), one conversion a value; at most kChunkBytes
+// of memory a reader.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "io/gltf_document.h"
+#include "io/read_ahead.h"
 
 namespace shoal::gltf {
 
@@ -17,7 +19,8 @@ inline constexpr uint64_t kChunkBytes = 1u << 20;
 /// What is read at once: small enough that vertices in no order at all do not read a megabyte each.
 inline constexpr uint64_t kBlockBytes = 64u << 10;
 
-/// Open files of a document's buffers, opened on first use, at most `max_open_files` at once.
+/// Open files of a document's buffers, opened on first use, at most `max_open_files` at once. Read directly: the
+/// system's cache counts against the memory of a control group. kReadAheadBytes of memory (io/read_ahead.h).
 class BufferFiles {
  public:
   static constexpr size_t kMaxOpenFiles = 128;
@@ -36,6 +39,7 @@ class BufferFiles {
   Result<ReadableFile*> open(uint32_t buffer);
   std::vector<std::unique_ptr<ReadableFile>> files_;  // by buffer; null: not open
   std::vector<uint32_t> open_buffers_;                // oldest first
+  ReadAhead ahead_;
   uint64_t read_bytes_ = 0;
 };
 
