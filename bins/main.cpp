@@ -1,4 +1,5 @@
 // shoal: one program, one subcommand a task (docs/design.md). Exit codes: ErrorCode, and 10 of `diff`.
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <map>
@@ -72,7 +73,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  give_freed_memory_back();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file larger than the user's limit is an error to report, not an end
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {

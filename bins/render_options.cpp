@@ -14,6 +14,7 @@
 #include "bins/choice_option.h"
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
+#include "engine/source_files.h"
 #include "treelets/build_object.h"
 
 namespace shoal {
@@ -212,6 +213,7 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_flag("--buffered-reads", buffered_reads, "read through the operating system's cache")
       ->group("For experiments");
+  app.add_flag("--allow-stale", allow_stale, "render a .shoal even if its source changed since it was built");
   app.add_option("--cache-dir", cache_folder, "where built scenes are kept (default: ~/.cache/shoal)");
 }
 
@@ -234,9 +236,10 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
     SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, build, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
-  SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
-  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, prepared));
-  SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
+  SHOAL_ASSIGN_OR_RETURN(prepared.scene, open_scene(posix_file_system(), path, mode, {arguments.more_levels}));
+  if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
+    SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));
+  }
   SHOAL_RETURN_IF_ERROR(choose_sky(arguments.environment, prepared, console));
   return prepared;
 }

@@ -31,7 +31,7 @@ struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder;
   PictureOptions picture;
   ExecutionOptions execution;
-  bool buffered_reads = false;
+  bool buffered_reads = false, allow_stale = false;
   uint32_t more_levels = 32;
 
   void declare(CLI::App& app);

@@ -15,22 +15,10 @@ using Json = nlohmann::ordered_json;
 /// Bytes that are not UTF-8 are replaced: names come from the file.
 std::string dump(const Json& json) { return json.dump(1, ' ', false, Json::error_handler_t::replace); }
 
-int64_t modification_time_ns(const std::string& path) {
-  std::error_code error;
-  const auto time = std::filesystem::last_write_time(path, error);
-  if (error) return 0;
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
-}
-
 class SourceHash {
  public:
   explicit SourceHash(uint64_t seed) : words_{seed} {}
   void add(uint64_t word) { words_.push_back(word); }
-  void add_file(FileSystem& fs, const std::string& path, bool modification_times) {
-    auto file = fs.open(path, ReadMode::kBuffered);
-    add(file.ok() ? file.value()->size_bytes() : ~uint64_t{0});
-    if (modification_times) add(static_cast<uint64_t>(modification_time_ns(path)));
-  }
   uint64_t value() const { return XXH3_64bits(words_.data(), words_.size() * sizeof(uint64_t)); }
 
  private:
@@ -39,21 +27,21 @@ class SourceHash {
 
 }  // namespace
 
-uint64_t source_hash(FileSystem& fs, const gltf::Document& document, bool modification_times) {
-  SourceHash hash(document.content_hash);
-  hash.add_file(fs, document.path, modification_times);  // a .glb carries buffers beside its JSON
-  for (const gltf::Buffer& buffer : document.buffers) {
-    if (!buffer.path.empty()) hash.add_file(fs, buffer.path, modification_times);
-  }
-  for (const gltf::Image& image : document.images) {
-    if (!image.path.empty()) hash.add_file(fs, image.path, modification_times);
+uint64_t source_hash(const SourceFiles& sources, bool modification_times) {
+  SourceHash hash(sources.json_hash());
+  for (const SourceFile& file : sources.files()) {
+    hash.add(file.missing ? ~uint64_t{0} : file.bytes);
+    if (modification_times) hash.add(static_cast<uint64_t>(file.modified_ns));
   }
   return hash.value();
 }
 
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options) {
+  SourceFiles sources(fs);
+  SHOAL_RETURN_IF_ERROR(sources.add_document(gltf_path));
   SHOAL_ASSIGN_OR_RETURN(const gltf::Document document, gltf::load_document(fs, gltf_path, options.limits));
-  SourceHash hash(source_hash(fs, document, true));
+  SHOAL_RETURN_IF_ERROR(sources.add_parts(document));
+  SourceHash hash(source_hash(sources, true));
   hash.add(options.treelet_bytes);
   hash.add(kSceneVersion);
   hash.add(XXH3_64bits(kBuilderVersion, std::char_traits<char>::length(kBuilderVersion)));

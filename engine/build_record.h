@@ -8,6 +8,7 @@
 #include "engine/build_scene.h"
 #include "engine/flatten_nodes.h"
 #include "engine/scene_tables.h"
+#include "engine/source_files.h"
 
 namespace shoal {
 
@@ -15,8 +16,8 @@ inline constexpr const char* kBuilderVersion = "0.1.0";
 inline constexpr uint32_t kSceneVersion = 1;  ///< SceneHeader::version
 
 /// Hash of the JSON and of the sizes of the files it names; with `modification_times` of those too. A file that is
-/// missing counts as such. Cost: opens each file.
-uint64_t source_hash(FileSystem& fs, const gltf::Document& document, bool modification_times);
+/// missing counts as such.
+uint64_t source_hash(const SourceFiles& sources, bool modification_times);
 
 std::string build_record_json(const gltf::Document& document, const SceneHeader& header,
                               const SceneBuildReport& report);

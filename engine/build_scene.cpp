@@ -28,7 +28,10 @@ constexpr size_t kMaxWarnings = 100;
 class SceneBuilder {
  public:
   SceneBuilder(FileSystem& fs, const std::string& path, const SceneBuildOptions& options)
-      : fs_(fs), path_(path), options_(options) {}
+      : fs_(fs), path_(path), options_(options), sources_(fs) {}
+
+  /// Whether what was built is of one source; also where reading it failed for no other reason than that.
+  Status check_source() const { return sources_.check_unchanged(!options_.consume); }
 
   /// What was taken from the source so far, which no error gives back.
   uint64_t consumed_bytes() const { return consumer_ ? consumer_->released_bytes() : 0; }
@@ -57,7 +60,8 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(build_objects(coverage, sink));
     SHOAL_RETURN_IF_ERROR(place_objects());
     report_.source_read_bytes += files.read_bytes();
-    SHOAL_RETURN_IF_ERROR(write_tables(writer, sink));
+    SHOAL_RETURN_IF_ERROR(write_tables(writer, sink, output));
+    SHOAL_RETURN_IF_ERROR(check_source());
     SHOAL_RETURN_IF_ERROR(writer.finish());
     report_.file_bytes = writer.bytes_written();
     report_.consumed_bytes = consumed_bytes();
@@ -77,9 +81,11 @@ class SceneBuilder {
 
   Status read_document() {
     progress("reading", 0);
+    SHOAL_RETURN_IF_ERROR(sources_.add_document(path_));
     SHOAL_ASSIGN_OR_RETURN(document_bytes_, document_bytes(fs_, path_));
     SHOAL_RETURN_IF_ERROR(check_document(document_bytes_, cap_bytes(), path_));
     SHOAL_ASSIGN_OR_RETURN(document_, gltf::load_document(fs_, path_, options_.limits));
+    SHOAL_RETURN_IF_ERROR(sources_.add_parts(document_));
     note(document_.warnings);
     SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
     note(flat_.warnings);
@@ -226,7 +232,7 @@ class SceneBuilder {
     header.instanced_triangles_count = report_.instanced_triangles_count;
     header.degenerate_count = report_.degenerate_count;
     header.texture_bytes = textures_.pages_bytes;
-    header.content_hash = source_hash(fs_, document_, false);
+    header.content_hash = source_hash(sources_, false);
     sink.fill(header);
     Bounds3 bounds;
     for (const PlacedInstance& placed : placed_) bounds.include(placed.bounds);
@@ -234,7 +240,7 @@ class SceneBuilder {
     return header;
   }
 
-  Status write_tables(PageFileWriter& writer, const TreeletPageSink& sink) {
+  Status write_tables(PageFileWriter& writer, const TreeletPageSink& sink, const std::string& output) {
     progress("writing", 0);
     const SceneHeader header = make_header(sink);
     report_.treelets_count = sink.treelets().size();
@@ -258,13 +264,16 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kEmitters, emitters_));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kLights, convert_lights(document_, flat_)));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kCameras, convert_cameras(document_, flat_)));
-    return writer.append_table(tables::kNames, std::as_bytes(std::span(names)));
+    const std::string sources = sources_.table(output);
+    SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kNames, std::as_bytes(std::span(names))));
+    return writer.append_table(tables::kSourceFiles, std::as_bytes(std::span(sources)));
   }
 
   FileSystem& fs_;
   const std::string& path_;
   const SceneBuildOptions& options_;
   SceneBuildReport report_;
+  SourceFiles sources_;
   gltf::Document document_;
   FlatScene flat_;
   GeometryPlan geometry_;
@@ -281,6 +290,18 @@ class SceneBuilder {
   std::vector<std::pair<std::string, uint64_t>> stages_;  // triangles done
 };
 
+/// What else there is to say of an error: a source that changes under the build looks damaged or cut short.
+Error explain(const SceneBuilder& builder, Error error) {
+  if (error.code == ErrorCode::kInput || error.code == ErrorCode::kStorage) {
+    const Status source = builder.check_source();
+    if (!source.ok() && source.error().code == ErrorCode::kInput) {
+      error = {ErrorCode::kInput, fmt::format("{} ({})", source.error().message, error.message)};
+    }
+  }
+  if (builder.consumed_bytes() > 0) error.message += "; the source was consumed in part and is no longer whole";
+  return error;
+}
+
 }  // namespace
 
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
@@ -289,9 +310,7 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
     SceneBuilder builder(fs, gltf_path, options);
     try {
       auto result = builder.run(output);
-      if (result.ok() || builder.consumed_bytes() == 0) return result;
-      return Error{result.error().code,
-                   fmt::format("{}; the source was consumed in part and is no longer whole", result.error().message)};
+      return result.ok() ? std::move(result) : explain(builder, result.error());
     } catch (const std::bad_alloc&) {
       return Error{ErrorCode::kMemoryCap, fmt::format("{}: the build ran out of memory", gltf_path)};
     }

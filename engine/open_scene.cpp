@@ -79,6 +79,9 @@ Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions t
   SHOAL_ASSIGN_OR_RETURN(scene.cameras, read_rows<CameraRecord>(file, tables::kCameras, "cameras"));
   SHOAL_ASSIGN_OR_RETURN(scene.build_record, read_text(file, tables::kBuildRecord));
   SHOAL_ASSIGN_OR_RETURN(scene.names, read_text(file, tables::kNames));
+  if (file.has_table(tables::kSourceFiles)) {
+    SHOAL_ASSIGN_OR_RETURN(scene.source_files, read_text(file, tables::kSourceFiles));
+  }
   SHOAL_RETURN_IF_ERROR(read_top_tree(file, static_cast<uint32_t>(scene.treelets.size()), traversal, scene));
   SHOAL_RETURN_IF_ERROR(check_tables(scene));
   return scene;
@@ -88,6 +91,7 @@ uint64_t Scene::resident_bytes() const {
   const auto bytes = [](const auto& rows) { return uint64_t{rows.capacity()} * sizeof(rows[0]); };
   return top_tree.resident_bytes() + bytes(treelets) + bytes(materials) + bytes(textures) + bytes(emitters) +
          bytes(lights) + bytes(cameras) + bytes(entries_by_treelet) + bytes(build_record) + bytes(names) +
+         bytes(source_files) +
          file->records().size_bytes();
 }
 

@@ -25,6 +25,7 @@ struct Scene {
   std::vector<uint32_t> entries_by_treelet;  ///< indices of top_tree.entries(), in order of their treelet
   std::string build_record;                  ///< JSON
   std::string names;                         ///< JSON: {"materials": [...], "cameras": [...], "lights": [...]}
+  std::string source_files;                  ///< engine/source_files.h; may be empty
 
   uint64_t resident_bytes() const;
 };

@@ -23,6 +23,7 @@ inline constexpr TableId kEmitters = 9;      ///< Emitter[]
 inline constexpr TableId kLights = 10;       ///< PunctualLight[]
 inline constexpr TableId kCameras = 11;      ///< CameraRecord[]
 inline constexpr TableId kNames = 12;        ///< JSON: names of materials, cameras, lights, for messages
+inline constexpr TableId kSourceFiles = 13;  ///< engine/source_files.h; absent from files of earlier versions
 }  // namespace tables
 
 struct SceneHeader {

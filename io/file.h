@@ -21,6 +21,8 @@ class ReadableFile {
   /// first fails. Fails with: kStorage (the message names file, offset, expected and found).
   virtual Status read_at(uint64_t offset, std::span<std::byte> out) = 0;
   virtual uint64_t size_bytes() const = 0;
+  /// Time of modification when it was opened; 0 where there is no such time.
+  virtual int64_t modified_ns() const { return 0; }
   virtual const std::string& path() const = 0;
   /// For reads that go on by themselves (io/async_reader); -1: read_at() is the only way.
   virtual int descriptor() const { return -1; }

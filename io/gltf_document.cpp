@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <algorithm>
+#include <memory>
+
 #include "io/gltf_json.h"
 #include "io/gltf_sections.h"
 
@@ -68,6 +71,29 @@ uint32_t component_bytes(ComponentType type) {
       return 4;
   }
   return 0;
+}
+
+Result<uint64_t> json_hash(FileSystem& fs, const std::string& path) {
+  SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kDirect));
+  SHOAL_ASSIGN_OR_RETURN(const auto chunks, find_glb_chunks(*file));
+  const FileRange range = chunks ? chunks->json : FileRange{0, file->size_bytes()};
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  if (!state) return Error{ErrorCode::kMemoryCap, "no memory to hash a file"};
+  XXH3_64bits_reset(state.get());
+  std::vector<char> block(256u << 10);
+  uint64_t padding = 0;  // zero bytes seen that are left out if they are the last
+  for (uint64_t at = 0; at < range.bytes; at += block.size()) {
+    block.resize(std::min<uint64_t>(block.size(), range.bytes - at));
+    SHOAL_RETURN_IF_ERROR(file->read_at(range.offset + at, std::as_writable_bytes(std::span(block))));
+    const auto last = std::find_if(block.rbegin(), block.rend(), [](char c) { return c != '\0'; });
+    const auto used = static_cast<size_t>(block.rend() - last);
+    if (used > 0) {
+      for (; padding > 0; --padding) XXH3_64bits_update(state.get(), "", 1);
+      XXH3_64bits_update(state.get(), block.data(), used);
+    }
+    padding += block.size() - used;
+  }
+  return XXH3_64bits_digest(state.get());
 }
 
 Result<Document> load_document(FileSystem& fs, const std::string& path, const Limits& limits) {

@@ -178,6 +178,9 @@ struct Document {
 /// Fails with: kInput (missing, truncated, malformed, over a budget; names file and JSON place such as
 /// "accessors[3].count"), kUnsupported (extensionsRequired that are not read, named with what to do).
 Result<Document> load_document(FileSystem& fs, const std::string& path, const Limits& limits = {});
+/// Document::content_hash of the file as it is now, without reading it as JSON: a block at a time, so any size will do.
+/// Fails with: kInput (missing, a malformed .glb), kStorage.
+Result<uint64_t> json_hash(FileSystem& fs, const std::string& path);
 
 /// The extensions that are read: in extensionsRequired these are accepted.
 bool extension_supported(const std::string& name);

@@ -19,10 +19,15 @@ namespace {
 
 class PosixReadableFile final : public ReadableFile {
  public:
-  PosixReadableFile(std::string path, Descriptor fd, uint64_t size_bytes, bool direct)
-      : path_(std::move(path)), fd_(std::move(fd)), size_bytes_(size_bytes), direct_(direct) {}
+  PosixReadableFile(std::string path, Descriptor fd, const struct stat& info, bool direct)
+      : path_(std::move(path)),
+        fd_(std::move(fd)),
+        size_bytes_(static_cast<uint64_t>(info.st_size)),
+        modified_ns_(info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec),
+        direct_(direct) {}
 
   uint64_t size_bytes() const override { return size_bytes_; }
+  int64_t modified_ns() const override { return modified_ns_; }
   const std::string& path() const override { return path_; }
   int descriptor() const override { return fd_.get(); }
 
@@ -71,6 +76,7 @@ class PosixReadableFile final : public ReadableFile {
   const std::string path_;
   const Descriptor fd_;
   const uint64_t size_bytes_;
+  const int64_t modified_ns_;
   std::atomic<bool> direct_;
 };
 
@@ -107,8 +113,8 @@ class PosixFileSystem final : public FileSystem {
       return Error{ErrorCode::kInput, fmt::format("cannot open {}: expected a regular file, found {}", path,
                                                   S_ISDIR(info.st_mode) ? "a directory" : "a pipe or a device")};
     }
-    return std::unique_ptr<ReadableFile>(std::make_unique<PosixReadableFile>(
-        path, std::move(descriptor), static_cast<uint64_t>(info.st_size), direct));
+    return std::unique_ptr<ReadableFile>(
+        std::make_unique<PosixReadableFile>(path, std::move(descriptor), info, direct));
   }
 
   Result<std::unique_ptr<WritableFile>> create(const std::string& path, WriteMode mode) override {

@@ -7,28 +7,12 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 namespace shoal::testing {
-
-/// A folder of its own under the system's temporary one, removed with all it holds.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  std::string path() const { return path_.string(); }
-  /// Names of what lies in it, hidden files too, sorted; of a folder in it when `inside` names one.
-  std::vector<std::string> names(const std::string& inside = "") const;
-
- private:
-  std::filesystem::path path_;
-};
 
 struct ProgramRun {
   int exit_code = -1;  ///< -1: it did not exit by itself

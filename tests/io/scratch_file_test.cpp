@@ -64,7 +64,7 @@ void write_and_read_back(FileSystem& fs, const std::string& folder) {
 }
 
 TEST(ScratchFile, GivesBackWhatWasWrittenAtAnyAlignment) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   write_and_read_back(posix_file_system(), folder.path());
   EXPECT_TRUE(folder.names().empty());
 }
@@ -81,14 +81,14 @@ TEST(ScratchFile, WorksInMemory) {
 }
 
 TEST(ScratchFile, HasNoNameWhileItIsInUse) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   const auto file = ScratchFile::create(posix_file_system(), folder.path(), 1u << 20);
   ASSERT_TRUE(file.ok());
   EXPECT_TRUE(folder.names().empty());
 }
 
 TEST(ScratchFile, ThreadsWriteAndReadTheirOwnRanges) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   constexpr uint64_t kThreads = 4, kPieces = 32, kPieceBytes = 3 * kBlockBytes;
   const auto file = ScratchFile::create(posix_file_system(), folder.path(), kThreads * kPieces * kPieceBytes);
   ASSERT_TRUE(file.ok());
@@ -109,9 +109,9 @@ TEST(ScratchFile, ThreadsWriteAndReadTheirOwnRanges) {
 }
 
 TEST(ScratchFile, NamesTheFolderThatIsMissingOrTakesNoFiles) {
-  const TemporaryFolder folder;
-  std::ofstream(folder.path("file")) << "x";
-  for (const std::string& bad : {folder.path("missing"), folder.path("file"), std::string("/proc")}) {
+  const testing::TemporaryFolder folder;
+  std::ofstream(folder / "file") << "x";
+  for (const std::string& bad : {folder / "missing", folder / "file", std::string("/proc")}) {
     const auto file = ScratchFile::create(posix_file_system(), bad, 1u << 20);
     ASSERT_FALSE(file.ok()) << bad;
     EXPECT_EQ(file.error().code, ErrorCode::kStorage);
@@ -121,7 +121,7 @@ TEST(ScratchFile, NamesTheFolderThatIsMissingOrTakesNoFiles) {
 }
 
 TEST(ScratchFile, FindsOutThatTheDiskIsTooSmallBeforeAnyWriting) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   const uint64_t before = used_bytes(folder.path());
   const uint64_t bytes = uint64_t{1} << 43;  // 8 TiB
   const auto file = ScratchFile::create(posix_file_system(), folder.path(), bytes);
@@ -135,14 +135,14 @@ TEST(ScratchFile, FindsOutThatTheDiskIsTooSmallBeforeAnyWriting) {
 }
 
 TEST(FileRelease, GivesBackWholeBlocksAndKeepsTheRest) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   const Bytes bytes = pattern_bytes(100 * kBlockBytes + 17, 3, 0);
   MemoryFileSystem memory;
   memory.put("part.bin", bytes);
-  ASSERT_TRUE(write_whole_file(posix_file_system(), folder.path("part.bin"), bytes).ok());
-  const uint64_t before = disk_bytes(folder.path("part.bin"));
+  ASSERT_TRUE(write_whole_file(posix_file_system(), folder / "part.bin", bytes).ok());
+  const uint64_t before = disk_bytes(folder / "part.bin");
   const std::pair<FileSystem*, std::string> places[] = {{&memory, "part.bin"},
-                                                        {&posix_file_system(), folder.path("part.bin")}};
+                                                        {&posix_file_system(), folder / "part.bin"}};
   for (const auto& [fs, path] : places) {
     const auto given = fs->release(path, 10 * kBlockBytes - 1, 20 * kBlockBytes + 2);
     ASSERT_TRUE(given.ok()) << given.error().message;
@@ -156,7 +156,7 @@ TEST(FileRelease, GivesBackWholeBlocksAndKeepsTheRest) {
     EXPECT_EQ(fs->release(path, 1, kBlockBytes).value(), 0u);
     EXPECT_EQ(fs->release("missing.bin", 0, kBlockBytes).error().code, ErrorCode::kStorage);
   }
-  EXPECT_EQ(disk_bytes(folder.path("part.bin")), before - 20 * kBlockBytes);
+  EXPECT_EQ(disk_bytes(folder / "part.bin"), before - 20 * kBlockBytes);
 }
 
 }  // namespace

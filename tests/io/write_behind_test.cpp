@@ -52,11 +52,11 @@ Bytes write_pieces(FileSystem& fs, const std::string& path, WriteMode mode) {
 }
 
 TEST(WriteBehind, WritesTheSameBytesInBothModes) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   MemoryFileSystem memory;
   for (const WriteMode mode : {WriteMode::kBuffered, WriteMode::kDirect}) {
-    const Bytes expected = write_pieces(posix_file_system(), folder.path("a"), mode);
-    EXPECT_EQ(bytes_of(posix_file_system(), folder.path("a")), expected);
+    const Bytes expected = write_pieces(posix_file_system(), folder / "a", mode);
+    EXPECT_EQ(bytes_of(posix_file_system(), folder / "a"), expected);
     write_pieces(memory, "a", mode);
     EXPECT_EQ(memory.contents("a"), expected);
   }
@@ -64,18 +64,18 @@ TEST(WriteBehind, WritesTheSameBytesInBothModes) {
 }
 
 TEST(WriteBehind, AFileOfNoBytesIsAFile) {
-  const TemporaryFolder folder;
-  auto file = AtomicFile::create(posix_file_system(), folder.path("a"), WriteMode::kDirect);
+  const testing::TemporaryFolder folder;
+  auto file = AtomicFile::create(posix_file_system(), folder / "a", WriteMode::kDirect);
   ASSERT_TRUE(file.ok());
   ASSERT_TRUE(file.value().commit().ok());
-  EXPECT_TRUE(bytes_of(posix_file_system(), folder.path("a")).empty());
+  EXPECT_TRUE(bytes_of(posix_file_system(), folder / "a").empty());
 }
 
 TEST(WriteBehind, AFileLetGoWhileItIsWrittenLeavesNothing) {
-  const TemporaryFolder folder;
+  const testing::TemporaryFolder folder;
   const Bytes piece = pattern_bytes(kWriteBehindBufferBytes, 1, 0);
   for (int pieces = 0; pieces < 5; ++pieces) {
-    auto file = AtomicFile::create(posix_file_system(), folder.path("a"), WriteMode::kDirect);
+    auto file = AtomicFile::create(posix_file_system(), folder / "a", WriteMode::kDirect);
     ASSERT_TRUE(file.ok());
     for (int i = 0; i < pieces; ++i) ASSERT_TRUE(file.value().append(piece).ok());
     const AtomicFile moved = std::move(file).value();

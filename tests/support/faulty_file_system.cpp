@@ -44,10 +44,11 @@ Fault FaultyFileSystem::next(Call call) {
 template <class File>
 Status FaultyFileSystem::read(File& file, const std::string& name, uint64_t offset, std::span<std::byte> out) {
   const Fault fault = next(Call::kRead);
-  if (fault == Fault::kIoError) return failure(fault, name);
+  const std::string place = name + " at offset " + std::to_string(offset);
+  if (fault == Fault::kIoError) return failure(fault, place);
   if (fault == Fault::kShortRead) {
     SHOAL_RETURN_IF_ERROR(file.read_at(offset, out.first(out.size() / 2)));
-    return Error{ErrorCode::kStorage, name + ": short read"};
+    return Error{ErrorCode::kStorage, place + ": short read"};
   }
   SHOAL_RETURN_IF_ERROR(file.read_at(offset, out));
   if (fault == Fault::kBitFlip && !out.empty()) out[out.size() / 3] ^= std::byte{0x10};
@@ -62,7 +63,7 @@ Status FaultyFileSystem::write(File& file, const std::string& name, uint64_t off
   const uint64_t half = bytes.size() / 2;
   const uint64_t done = bytes.size() % kBlockBytes == 0 ? align_down(half, kBlockBytes) : half;
   SHOAL_RETURN_IF_ERROR(file.write_at(offset, bytes.first(done)));
-  return failure(fault, name);
+  return failure(fault, name + " at offset " + std::to_string(offset));
 }
 
 class FaultyFileSystem::Reader final : public ReadableFile {
@@ -73,6 +74,7 @@ class FaultyFileSystem::Reader final : public ReadableFile {
     return fs_.read(*base_, path(), offset, out);
   }
   uint64_t size_bytes() const override { return base_->size_bytes(); }
+  int64_t modified_ns() const override { return base_->modified_ns(); }
   const std::string& path() const override { return base_->path(); }
 
  private:

@@ -23,7 +23,8 @@ uint64_t zero_blocks(std::vector<std::byte>& file, uint64_t offset, uint64_t byt
 
 class MemoryFileSystem::Reader final : public ReadableFile {
  public:
-  Reader(std::string path, Bytes bytes) : path_(std::move(path)), bytes_(std::move(bytes)) {}
+  Reader(std::string path, Bytes bytes, int64_t modified_ns)
+      : path_(std::move(path)), bytes_(std::move(bytes)), modified_ns_(modified_ns) {}
 
   Status read_at(uint64_t offset, std::span<std::byte> out) override {
     const uint64_t found = offset < bytes_.size() ? bytes_.size() - offset : 0;
@@ -35,11 +36,13 @@ class MemoryFileSystem::Reader final : public ReadableFile {
     return {};
   }
   uint64_t size_bytes() const override { return bytes_.size(); }
+  int64_t modified_ns() const override { return modified_ns_; }
   const std::string& path() const override { return path_; }
 
  private:
   const std::string path_;
   const Bytes bytes_;
+  const int64_t modified_ns_;
 };
 
 class MemoryFileSystem::Writer final : public WritableFile {
@@ -84,7 +87,7 @@ Result<std::unique_ptr<ReadableFile>> MemoryFileSystem::open(const std::string& 
   const std::lock_guard lock(mutex_);
   const auto found = files_.find(path);
   if (found == files_.end()) return Error{ErrorCode::kInput, "cannot open " + path + ": no such file"};
-  return std::unique_ptr<ReadableFile>(std::make_unique<Reader>(path, *found->second));
+  return std::unique_ptr<ReadableFile>(std::make_unique<Reader>(path, *found->second, modified_[path]));
 }
 
 Result<std::unique_ptr<WritableFile>> MemoryFileSystem::create(const std::string& path, WriteMode) {
@@ -124,6 +127,7 @@ Status MemoryFileSystem::remove(const std::string& path) {
 void MemoryFileSystem::put(const std::string& path, std::vector<std::byte> bytes) {
   const std::lock_guard lock(mutex_);
   files_[path] = std::make_shared<Bytes>(std::move(bytes));
+  modified_[path] = ++clock_;
 }
 
 void MemoryFileSystem::put(const std::string& path, const std::string& text) {

@@ -21,7 +21,7 @@ class MemoryFileSystem final : public FileSystem {
   Status rename(const std::string& from, const std::string& to) override;
   Status remove(const std::string& path) override;
 
-  /// Puts a whole file there, or replaces it.
+  /// Puts a whole file there, or replaces it; its time of modification is another each time.
   void put(const std::string& path, std::vector<std::byte> bytes);
   void put(const std::string& path, const std::string& text);
   bool exists(const std::string& path) const;
@@ -34,6 +34,8 @@ class MemoryFileSystem final : public FileSystem {
   using Bytes = std::vector<std::byte>;
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Bytes>> files_;
+  std::map<std::string, int64_t> modified_;
+  int64_t clock_ = 0;
 
   class Reader;
   class Writer;

@@ -1,30 +1,31 @@
 #include "tests/support/temporary_folder.h"
 
-#include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <stdexcept>
 
-namespace shoal {
-
-namespace stdfs = std::filesystem;
+namespace shoal::testing {
 
 TemporaryFolder::TemporaryFolder() {
-  path_ = (stdfs::temp_directory_path() / "shoal_test_XXXXXX").string();
-  EXPECT_NE(::mkdtemp(path_.data()), nullptr);
+  std::string name = (std::filesystem::temp_directory_path() / "shoal-test-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder: " + name);
+  path_ = name;
 }
 
 TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  stdfs::remove_all(path_, ignored);
+  std::error_code code;
+  std::filesystem::remove_all(path_, code);
 }
 
-std::vector<std::string> TemporaryFolder::names() const {
-  std::vector<std::string> all;
-  for (const auto& entry : stdfs::directory_iterator(path_)) all.push_back(entry.path().filename().string());
-  std::sort(all.begin(), all.end());
-  return all;
+std::vector<std::string> TemporaryFolder::names(const std::string& inside) const {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(path_ / inside)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(".output-")) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
-}  // namespace shoal
+}  // namespace shoal::testing

@@ -1,10 +1,11 @@
-// A folder of its own for a test that needs real files; gone with everything in it when the test ends.
+// A folder of its own under the system's temporary one, removed with all it holds when the test ends.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
-namespace shoal {
+namespace shoal::testing {
 
 class TemporaryFolder {
  public:
@@ -13,13 +14,14 @@ class TemporaryFolder {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-  const std::string& path() const { return path_; }
-  std::string path(const std::string& name) const { return path_ + "/" + name; }
-  /// Names of all that is in it, hidden ones too, sorted.
-  std::vector<std::string> names() const;
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  std::string path() const { return path_.string(); }
+  /// Names of what lies in it, hidden files too (but for `.output-*`, which tests of the program write), sorted; of a
+  /// folder in it when `inside` names one.
+  std::vector<std::string> names(const std::string& inside = "") const;
 
  private:
-  std::string path_;
+  std::filesystem::path path_;
 };
 
-}  // namespace shoal
+}  // namespace shoal::testing

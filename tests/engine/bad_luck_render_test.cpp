@@ -1,0 +1,120 @@
+// Whatever read fails in the middle of a render, in either order: it ends with the right code and names file and page; a
+// read ahead that fails harms nothing, or ends the render likewise.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "engine/build_scene.h"
+#include "engine/render.h"
+#include "io/page_cache.h"
+#include "tests/engine/bad_luck_scene.h"
+#include "tests/support/faulty_file_system.h"
+
+namespace shoal::testing {
+namespace {
+
+struct Way {
+  const char* name;
+  Order order;
+  unsigned threads;
+  uint32_t read_depth;  ///< 0: every page is read when it is needed, so that no failed read may go unnoticed
+};
+
+const Way kWays[] = {{"depth-first", Order::kDepthFirst, 1, 0},
+                     {"depth-first, two threads", Order::kDepthFirst, 2, 0},
+                     {"queued", Order::kQueued, 1, 0},
+                     {"queued, reading ahead", Order::kQueued, 2, 8}};
+
+class BadLuckRender : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    save_bad_luck_scene(memory_, 2000);
+    SceneBuildOptions options;
+    options.threads = 1;
+    options.treelet_bytes = 4u << 10;
+    ASSERT_TRUE(build_scene(memory_, "scene.gltf", "scene.shoal", options).ok());
+  }
+
+  Result<RenderResult> render_way(const Way& way) {
+    SHOAL_ASSIGN_OR_RETURN(const Scene scene, open_scene(fs_, "scene.shoal", ReadMode::kDirect, {}));
+    PictureOptions picture;
+    picture.width = picture.height = 8;
+    picture.samples = 1;
+    picture.shading.environment.kind = EnvironmentOptions::Kind::kConstant;
+    ExecutionOptions execution;
+    execution.order = way.order;
+    execution.threads = way.threads;
+    execution.rays_in_flight = 64;
+    execution.paging.read_depth = way.read_depth;
+    execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.file, way.threads);
+    opening_calls_ = fs_.calls();
+    return render(fs_, scene, picture, execution);
+  }
+
+  /// Harms every read of the render in turn, but for those of opening the scene, until none is left.
+  void harm_every_read(const Way& way, Fault fault) {
+    fs_.arm(Fault::kNone, 0);
+    const auto clean = render_way(way);
+    ASSERT_TRUE(clean.ok()) << clean.error().message;
+    fs_.arm(fault, ~uint64_t{0});
+    ASSERT_TRUE(render_way(way).ok());
+    uint64_t failures = 0;
+    for (uint64_t call = opening_calls_; call < opening_calls_ + kMostCalls; ++call) {
+      fs_.arm(fault, call);
+      const auto result = render_way(way);
+      const bool harmed = fs_.calls() > call;
+      if (result.ok()) {
+        EXPECT_TRUE(!harmed || way.read_depth > 0) << way.name << ": read " << call << " failed and nobody noticed";
+        ASSERT_EQ(result.value().rgba.size(), clean.value().rgba.size());
+        EXPECT_EQ(std::memcmp(result.value().rgba.data(), clean.value().rgba.data(),
+                              clean.value().rgba.size() * sizeof(float)), 0) << way.name << " read " << call;
+        if (!harmed) break;
+        continue;
+      }
+      ++failures;
+      const Error& error = result.error();
+      EXPECT_EQ(error.code, fault == Fault::kBitFlip ? ErrorCode::kCorrupt : ErrorCode::kStorage)
+          << way.name << " read " << call << ": " << error.message;
+      EXPECT_NE(error.message.find("scene.shoal"), std::string::npos) << error.message;
+      EXPECT_NE(error.message.find("at offset"), std::string::npos) << error.message;
+    }
+    EXPECT_GT(failures, 10u) << way.name;
+    EXPECT_EQ(memory_.names(), names_);
+  }
+
+  static constexpr uint64_t kMostCalls = 300;  // enough: which page is read last makes no difference
+  const std::vector<std::string> names_{"image0.png", "scene.bin", "scene.gltf", "scene.shoal"};
+  MemoryFileSystem memory_;
+  FaultyFileSystem fs_{memory_};
+  uint64_t opening_calls_ = 0;
+};
+
+TEST_F(BadLuckRender, ADiskThatFailsEndsItAtAnyRead) {
+  for (const Way& way : kWays) harm_every_read(way, Fault::kIoError);
+}
+
+TEST_F(BadLuckRender, AReadCutShortEndsItAtAnyRead) {
+  for (const Way& way : kWays) harm_every_read(way, Fault::kShortRead);
+}
+
+TEST_F(BadLuckRender, APageWithAFlippedBitEndsItAtAnyRead) {
+  for (const Way& way : kWays) harm_every_read(way, Fault::kBitFlip);
+}
+
+TEST_F(BadLuckRender, ADiskThatFailsForGoodEndsEveryWay) {
+  for (const Way& way : kWays) {
+    for (const uint64_t call : {0, 7, 31}) {
+      fs_.arm(Fault::kNone, 0);
+      ASSERT_TRUE(render_way(way).ok());
+      fs_.arm(Fault::kShortRead, ~uint64_t{0});
+      ASSERT_TRUE(render_way(way).ok());
+      fs_.arm(Fault::kShortRead, opening_calls_ + call, true);
+      const auto result = render_way(way);
+      ASSERT_FALSE(result.ok()) << way.name << " from read " << call;
+      EXPECT_EQ(result.error().code, ErrorCode::kStorage);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace shoal::testing
