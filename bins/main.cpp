@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  give_freed_memory_back();
   std::signal(SIGXFSZ, SIG_IGN);  // a file larger than the user's limit is an error to report, not an end
   try {
     return run(argc, argv);

@@ -236,7 +236,9 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
     SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, build, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
-  SHOAL_ASSIGN_OR_RETURN(prepared.scene, open_scene(posix_file_system(), path, mode, {arguments.more_levels}));
+  SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
+  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, prepared));
+  SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));
   }

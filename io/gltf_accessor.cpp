@@ -107,7 +107,8 @@ Result<AccessorReader> AccessorReader::open(BufferFiles& files, const Document& 
     reader.stride_ = document.views[*source.view].byte_stride;
   }
   reader.block_elements_ = kBlockBytes / reader.stride_;
-  reader.blocks_.resize(kBlockCount);
+  const uint64_t blocks = (reader.count_ + reader.block_elements_ - 1) / reader.block_elements_;
+  reader.numbers_.resize(std::clamp<uint64_t>(blocks, 1, kBlockCount), kNoBlock);
   if (source.view) SHOAL_RETURN_IF_ERROR(files.check(document.views[*source.view].buffer));
   if (source.sparse) SHOAL_RETURN_IF_ERROR(reader.check_sparse_indices());
   return reader;
@@ -160,7 +161,7 @@ Status AccessorReader::apply_sparse(uint64_t first, uint64_t n, std::span<std::b
     const auto end = std::lower_bound(begin, indices.end(), first + n);
     if (begin == end) continue;
     const uint64_t value = run * kSparseRun + static_cast<uint64_t>(begin - indices.begin());
-    values.resize(static_cast<size_t>(end - begin) * element_bytes_);  // at most a block: indices are distinct
+    values.resize(static_cast<size_t>(end - begin) * element_bytes_);  // at most a chunk: indices are distinct
     SHOAL_RETURN_IF_ERROR(
         files_->read(view.buffer, view.byte_offset + sparse.values_offset + value * element_bytes_, values));
     const std::byte* source = values.data();
@@ -171,23 +172,27 @@ Status AccessorReader::apply_sparse(uint64_t first, uint64_t n, std::span<std::b
   return {};
 }
 
-Result<const std::byte*> AccessorReader::load_block(uint64_t number) {
-  Block& block = blocks_[number % kBlockCount];
-  if (block.number == number) return static_cast<const std::byte*>(block.bytes.data());
+Result<const std::byte*> AccessorReader::load_blocks(uint64_t number, uint64_t last) {
   const Accessor& accessor = document_->accessors[accessor_];
-  const uint64_t first = number * block_elements_, n = std::min(block_elements_, count_ - first);
-  block.number = kNoBlock;
-  block.bytes.resize((n - 1) * stride_ + element_bytes_);
+  const size_t slot = number % numbers_.size();
+  SHOAL_ASSIGN_OR_RETURN(const auto slots, slots_.reserve(numbers_.size() * block_bytes()));
+  std::byte* const begin = slots.data() + slot * block_bytes();
+  if (numbers_[slot] == number) return static_cast<const std::byte*>(begin);
+  size_t run = 1;
+  while (slot + run < numbers_.size() && number + run <= last && numbers_[slot + run] != number + run) ++run;
+  std::fill_n(numbers_.begin() + static_cast<std::ptrdiff_t>(slot), run, kNoBlock);
+  const uint64_t first = number * block_elements_, n = std::min(run * block_elements_, count_ - first);
+  const std::span<std::byte> bytes(begin, (n - 1) * stride_ + element_bytes_);
   if (accessor.view) {
     const BufferView& view = document_->views[*accessor.view];
     const uint64_t offset = view.byte_offset + accessor.byte_offset + first * stride_;
-    SHOAL_RETURN_IF_ERROR(files_->read(view.buffer, offset, block.bytes));
+    SHOAL_RETURN_IF_ERROR(files_->read(view.buffer, offset, bytes));
   } else {
-    std::fill(block.bytes.begin(), block.bytes.end(), std::byte{0});
+    std::fill(bytes.begin(), bytes.end(), std::byte{0});
   }
-  if (accessor.sparse) SHOAL_RETURN_IF_ERROR(apply_sparse(first, n, block.bytes));
-  block.number = number;
-  return static_cast<const std::byte*>(block.bytes.data());
+  if (accessor.sparse) SHOAL_RETURN_IF_ERROR(apply_sparse(first, n, bytes));
+  for (size_t i = 0; i < run; ++i) numbers_[slot + i] = number + i;
+  return static_cast<const std::byte*>(begin);
 }
 
 template <class Convert>
@@ -195,9 +200,11 @@ Status AccessorReader::each_piece(uint64_t first, uint64_t n, Convert&& convert_
   if (first > count_ || n > count_ - first) {
     return error(fmt::format("expected elements below {}, found {} from {}", count_, n, first));
   }
+  if (n == 0) return {};
+  const uint64_t last = (first + n - 1) / block_elements_;
   while (n > 0) {
     const uint64_t skip = first % block_elements_, piece = std::min(n, block_elements_ - skip);
-    SHOAL_ASSIGN_OR_RETURN(const std::byte* bytes, load_block(first / block_elements_));
+    SHOAL_ASSIGN_OR_RETURN(const std::byte* bytes, load_blocks(first / block_elements_, last));
     convert_piece(bytes + skip * stride_, piece);
     first += piece;
     n -= piece;

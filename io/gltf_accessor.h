@@ -1,8 +1,8 @@
 // Accessors as streams of floats or indices, read in bounded chunks from the file: a buffer is never held whole nor
 // mapped. Handles every component type, stride, normalised integers, sparse values and missing views.
 // Called by engine/build_scene. Thread rule: a BufferFiles and its readers belong to one thread; a document may be
-// shared. Cost: one read of a block (kBlockBytes; larger in sequence), one conversion a value; at most kChunkBytes
-// of memory a reader.
+// shared. Cost: one read of the blocks (kBlockBytes) that a call wants and are not at hand, one conversion a value;
+// at most kChunkBytes of memory a reader.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "io/aligned_buffer.h"
 #include "io/gltf_document.h"
-#include "io/read_ahead.h"
 
 namespace shoal::gltf {
 
@@ -20,7 +20,7 @@ inline constexpr uint64_t kChunkBytes = 1u << 20;
 inline constexpr uint64_t kBlockBytes = 64u << 10;
 
 /// Open files of a document's buffers, opened on first use, at most `max_open_files` at once. Read directly: the
-/// system's cache counts against the memory of a control group. kReadAheadBytes of memory (io/read_ahead.h).
+/// system's cache counts against the memory of a control group.
 class BufferFiles {
  public:
   static constexpr size_t kMaxOpenFiles = 128;
@@ -39,7 +39,6 @@ class BufferFiles {
   Result<ReadableFile*> open(uint32_t buffer);
   std::vector<std::unique_ptr<ReadableFile>> files_;  // by buffer; null: not open
   std::vector<uint32_t> open_buffers_;                // oldest first
-  ReadAhead ahead_;
   uint64_t read_bytes_ = 0;
 };
 
@@ -62,13 +61,12 @@ class AccessorReader {
  private:
   static constexpr uint64_t kNoBlock = ~0ull;
   static constexpr size_t kBlockCount = kChunkBytes / kBlockBytes;
-  struct Block {
-    uint64_t number = kNoBlock;
-    std::vector<std::byte> bytes;
-  };
 
   AccessorReader() = default;
-  Result<const std::byte*> load_block(uint64_t number);
+  uint64_t block_bytes() const { return block_elements_ * stride_; }
+  /// The bytes of block `number`. What must be read for it is read together with the blocks up to `last` that follow
+  /// and must be read too: large reads are what makes direct ones fast.
+  Result<const std::byte*> load_blocks(uint64_t number, uint64_t last);
   Status check_sparse_indices();
   Status read_sparse_indices(uint64_t first, std::span<uint32_t> out);
   Status apply_sparse(uint64_t first, uint64_t n, std::span<std::byte> bytes);
@@ -84,7 +82,8 @@ class AccessorReader {
   uint32_t components_ = 0;
   uint64_t stride_ = 0, element_bytes_ = 0;
   uint64_t block_elements_ = 0;
-  std::vector<Block> blocks_;            // kBlockCount, filled on first use
+  std::vector<uint64_t> numbers_;        // of the block in each slot, at most kBlockCount
+  AlignedBuffer slots_;                  // taken on first use
   std::vector<uint32_t> sparse_firsts_;  // the first of every kSparseRun sparse indices
 };
 

@@ -48,7 +48,7 @@ Status BufferFiles::read(uint32_t buffer, uint64_t offset, std::span<std::byte> 
     return {};
   }
   SHOAL_ASSIGN_OR_RETURN(ReadableFile* const file, open(buffer));
-  return ahead_.read(*file, buffer, source.path_offset + offset, out);
+  return file->read_at(source.path_offset + offset, out);
 }
 
 }  // namespace shoal::gltf

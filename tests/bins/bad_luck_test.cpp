@@ -45,6 +45,24 @@ TEST(BadLuck, ADiskThatIsTooSmallEndsWithCodeSixAndNoFile) {
   EXPECT_TRUE(folder.names("disk").empty());
 }
 
+TEST(BadLuck, AScratchFolderThatCannotBeUsedIsNamed) {
+  const TemporaryFolder folder;
+  expect_exit(run_shoal(folder, {"generate", "terrain", "--triangles", "400K", "--out", folder / "terrain", "--quiet"}),
+              0);
+  const auto build = [&](const std::string& scratch) {
+    return run_shoal(folder, {"build", folder / "terrain/terrain.gltf", "-o", folder / "o.shoal", "--max-memory", "72M",
+                              "--threads", "1", "--scratch", scratch, "--quiet"});
+  };
+  put_file(folder / "a-file", "x");
+  for (const std::string& bad : {folder / "missing", folder / "a-file", std::string("/proc")}) {
+    expect_error(build(bad), 6, {"scratch file of", bad});
+  }
+  const SmallDisk disk(folder / "disk", "1M");
+  if (disk.mounted()) expect_error(build(folder / "disk"), 6, {"scratch file of", "disk full"});
+  expect_exit(build(folder.path()), 0);
+  EXPECT_THAT(folder.names(), ::testing::ElementsAre("a-file", "disk", "o.shoal", "terrain"));
+}
+
 TEST(BadLuck, ASceneCutShortUnderARenderEndsIt) {
   const TemporaryFolder folder;
   make_terrain(folder, "50K");

@@ -18,7 +18,10 @@ std::vector<Build> builds() {
   SceneBuildOptions at_once;
   at_once.threads = 1;
   at_once.treelet_bytes = 4u << 10;
-  return {{"at once", at_once}};
+  SceneBuildOptions in_chunks = at_once;
+  in_chunks.chunk_triangles = 700;
+  in_chunks.scratch_folder = "scratch";
+  return {{"at once", at_once}, {"in chunks", in_chunks}};
 }
 
 std::vector<std::byte> clean_build(MemoryFileSystem& memory, const SceneBuildOptions& options) {

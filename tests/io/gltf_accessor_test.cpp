@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tests/io/gltf_scene.h"
+#include "tests/support/faulty_file_system.h"
 
 namespace shoal::gltf {
 namespace {
@@ -50,6 +51,55 @@ TEST(AccessorReader, ReadsEveryComponentTypeAndScalesNormalizedIntegers) {
   EXPECT_THAT(read(7), ElementsAre(0, 51 / 255.0f, 128 / 255.0f, 1));
   EXPECT_THAT(read(8), ElementsAre(-1, -1, 0, 1));
   EXPECT_THAT(read(9), ElementsAre(0, 13107 / 65535.0f, 32768 / 65535.0f, 1));
+}
+
+TEST(AccessorReader, BlocksThatFollowEachOtherAreReadTogether) {
+  GltfScene scene;
+  constexpr uint64_t kCount = 600007;  // 37 blocks
+  std::vector<float> values(kCount);
+  std::iota(values.begin(), values.end(), 0.0f);
+  scene.add_accessor(values, "SCALAR", kFloat, kCount);
+  Loaded loaded(scene);
+  FaultyFileSystem counting(loaded.fs);
+  BufferFiles files(counting, loaded.document);
+  auto reader = AccessorReader::open(files, loaded.document, 0);
+  ASSERT_TRUE(reader.ok());
+  std::vector<float> out(kCount);
+  const auto reads_of = [&](uint64_t first, uint64_t n) {
+    counting.arm(Fault::kShortRead, ~uint64_t{0});
+    EXPECT_TRUE(reader.value().read_floats(first, n, out).ok());
+    EXPECT_TRUE(std::equal(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n),
+                           values.begin() + static_cast<std::ptrdiff_t>(first)));
+    return counting.calls();
+  };
+  EXPECT_EQ(reads_of(0, kCount), 3u);           // a chunk at a time
+  EXPECT_EQ(reads_of(590000, 10000), 0u);       // still there
+  EXPECT_EQ(reads_of(100000, 10), 1u);          // one block
+  EXPECT_EQ(reads_of(90000, 30000), 2u);        // those before it, those behind it
+  EXPECT_EQ(reads_of(90000, 30000), 0u);
+  EXPECT_EQ(reads_of(5, 0), 0u);
+  std::mt19937 random(3);
+  for (int i = 0; i < 200; ++i) {
+    const uint64_t first = random() % kCount;
+    reads_of(first, random() % (kCount - first));
+  }
+}
+
+TEST(AccessorReader, ABlockWhoseReadFailedIsReadAgain) {
+  GltfScene scene;
+  std::vector<float> values(100000);
+  std::iota(values.begin(), values.end(), 0.0f);
+  scene.add_accessor(values, "SCALAR", kFloat, values.size());
+  Loaded loaded(scene);
+  FaultyFileSystem fs(loaded.fs);
+  BufferFiles files(fs, loaded.document);
+  auto reader = AccessorReader::open(files, loaded.document, 0);
+  ASSERT_TRUE(reader.ok());
+  std::vector<float> out(values.size());
+  fs.arm(Fault::kShortRead, 0);
+  EXPECT_EQ(reader.value().read_floats(0, values.size(), out).error().code, ErrorCode::kStorage);
+  ASSERT_TRUE(reader.value().read_floats(0, values.size(), out).ok());
+  EXPECT_EQ(out, values);
 }
 
 TEST(AccessorReader, StepsOverInterleavedValues) {
