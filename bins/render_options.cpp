@@ -214,6 +214,8 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_flag("--buffered-reads", buffered_reads, "read through the operating system's cache")
       ->group("For experiments");
   app.add_flag("--allow-stale", allow_stale, "render a .shoal even if its source changed since it was built");
+  app.add_option("--scratch", scratch_folder, "folder for what does not fit in memory when a glTF is built (default: "
+                                              "that of the built scene)");
   app.add_option("--cache-dir", cache_folder, "where built scenes are kept (default: ~/.cache/shoal)");
 }
 
@@ -227,6 +229,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, parse_environment(arguments.environment));
   SceneBuildOptions build;
   build.threads = arguments.execution.threads;
+  build.scratch_folder = arguments.scratch_folder;
   build.max_memory_bytes = prepared.execution.max_memory_bytes;
   if (!arguments.treelet_size.empty()) {
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));

@@ -28,7 +28,7 @@ Status check_output(const std::string& path);
 
 /// Options as they stand on the command line.
 struct RenderArguments {
-  std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder;
+  std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder;
   PictureOptions picture;
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false;
