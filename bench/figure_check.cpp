@@ -43,6 +43,7 @@ Figure figure_check(const Setup& asked) {
   rivals.tile_sample = 2;
   add("rivals", figure_rivals(setup, rivals));
   add("amplification", figure_amplification(setup, {0.5}, {10'000}));
+  add("split", figure_split(setup, {0.5}, {0.5, 1}));
   RandomRays random;
   random.rays = 20'000, random.in_flight = 5'000, random.share = 0.5;
   add("random", figure_random(setup, random));

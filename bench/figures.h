@@ -33,6 +33,10 @@ Figure figure_rivals(const Setup& setup, const Rivals& rivals);
 /// Bytes read over bytes of geometry, by share resident and rays in flight.
 Figure figure_amplification(const Setup& setup, const std::vector<double>& shares, const std::vector<uint64_t>& rays);
 
+/// Time and bytes by how a cap is split between rays in flight and page cache: the split that is chosen beside `factors`
+/// of its paths.
+Figure figure_split(const Setup& setup, const std::vector<double>& shares, const std::vector<double>& factors);
+
 struct RandomRays {
   uint64_t rays = 8'000'000, in_flight = 4'000'000;
   double share = 0.25;

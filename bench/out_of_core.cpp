@@ -1,7 +1,7 @@
 // bench/out_of_core: the claims about scenes that do not fit in memory, a subcommand a figure (docs/measuring.md).
 // Every render is a process of its own, in a memory control group where the figure asks for one.
 //
-//   bench/out_of_core cap-held | quarter | rivals | amplification | random | policies | check
+//   bench/out_of_core cap-held | quarter | rivals | amplification | split | random | policies | check
 //   [options: --help]
 #include <fmt/format.h>
 
@@ -28,6 +28,7 @@ struct Arguments {
   double share = 0.25;
   std::vector<double> shares{0.25, 0.6};
   std::vector<uint64_t> rays{4'000'000, 16'000'000, 64'000'000};
+  std::vector<double> factors{0.125, 0.25, 0.5, 1, 2, 4, 8};
   Rivals rivals;
   RandomRays random;
   Policies policies;
@@ -82,6 +83,12 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
   amplification->add_option("--shares", a.shares, "of the pages in the cache")->delimiter(',')->capture_default_str();
   amplification->add_option("--rays", a.rays, "in flight")->delimiter(',')->transform(kCounts)->capture_default_str();
   amplification->callback([&] { figure = [&] { return figure_amplification(a.setup, a.shares, a.rays); }; });
+
+  CLI::App* split = declare_figure(app, a, "split", "memory split between rays in flight and page cache");
+  split->add_option("--shares", a.shares, "of the pages in the cache as split by itself")->delimiter(',')
+      ->capture_default_str();
+  split->add_option("--factors", a.factors, "of the paths that are chosen")->delimiter(',')->capture_default_str();
+  split->callback([&] { figure = [&] { return figure_split(a.setup, a.shares, a.factors); }; });
 
   CLI::App* random = declare_figure(app, a, "random", "rays from anywhere into any direction");
   random->add_option("--rays", a.random.rays, "in all")->transform(kCounts)->capture_default_str();

@@ -100,7 +100,7 @@ class SceneBuilder {
   /// Shares the cap out, before anything of size is read.
   Status plan_memory(gltf::BufferFiles& files) {
     BuildMemoryNeeds needs;
-    const ImageNeeds images = measure_images(fs_, files, document_, materials_.textures);
+    SHOAL_ASSIGN_OR_RETURN(const ImageNeeds images, measure_images(fs_, files, document_, materials_.textures));
     needs.image_bytes = images.largest_bytes;
     needs.coverage_bytes = images.coverage_bytes;
     needs.document_bytes = document_bytes_;

@@ -71,12 +71,13 @@ ImageHeader read_image_header(std::span<const std::byte> bytes) {
   return {};
 }
 
-ImageNeeds measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
+Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
                           const std::vector<TextureRequest>& requests) {
   ImageNeeds needs;
   for (size_t r = 0; r < requests.size(); ++r) {
     const auto head = read_head(fs, files, document, document.images[requests[r].image]);
-    if (!head.ok()) continue;
+    if (!head.ok() && head.error().code == ErrorCode::kStorage) return head.error();
+    if (!head.ok()) continue;  // reading the texture says what is wrong with it
     const ImageHeader header = read_image_header(head.value().bytes);
     const uint64_t pixels = uint64_t{header.width} * header.height;
     // The encoded bytes are there twice while a file is read.

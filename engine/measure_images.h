@@ -16,8 +16,8 @@ struct ImageNeeds {
 };
 
 /// Images that cannot be read or whose header is not understood count for nothing here: engine/tile_textures refuses
-/// them, or those above the pixels that the plan leaves.
-ImageNeeds measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
+/// them, or those above the pixels that the plan leaves. Fails with: kStorage.
+Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
                           const std::vector<TextureRequest>& requests);
 
 struct ImageHeader {

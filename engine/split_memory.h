@@ -1,5 +1,5 @@
 // How what is left of the cap is split between rays in flight and the page cache. A pure function of numbers, so that
-// it can be tested and measured (bench/memory_split). Called by engine/memory_plan.
+// it can be tested and measured (bench/out_of_core split). Called by engine/memory_plan.
 #pragma once
 
 #include <cstdint>
