@@ -5,20 +5,34 @@
 namespace shoal {
 namespace {
 
-/// Paths beyond this many in flight were not seen to pay in memory; out of core the share below decides.
-constexpr uint64_t kDefaultPaths = 1u << 19;
-/// Of what is left, the part that rays in flight may take when pages do not all fit: chosen, not yet measured.
-constexpr double kPathShare = 0.25;
+/// With fewer paths than these batches are so small that taking a treelet in hand costs more than tracing its rays: 2.3
+/// times the time with half of them, 7 times with an eighth (docs/decisions/0012). More were not seen to pay in memory.
+constexpr uint64_t kUsefulPaths = 1u << 19;
+
+/// The most paths, from `least` to `most`, that take no more than `bytes`; `least` if none does.
+uint64_t paths_within(const SplitInput& in, uint64_t least, uint64_t most, uint64_t bytes) {
+  while (least < most) {
+    const uint64_t middle = least + (most - least + 1) / 2;
+    if (in.paths_bytes(middle) <= bytes) {
+      least = middle;
+    } else {
+      most = middle - 1;
+    }
+  }
+  return least;
+}
 
 }  // namespace
 
 uint64_t choose_paths_in_flight(const SplitInput& in) {
-  uint64_t paths = std::max(in.least_paths, std::min(kDefaultPaths, in.samples));
-  if (in.scene_page_bytes + in.paths_bytes(paths) <= in.left_bytes) return paths;
-  const uint64_t share = std::min<uint64_t>(static_cast<uint64_t>(kPathShare * static_cast<double>(in.left_bytes)),
-                                            in.left_bytes - in.least_cache_bytes);
-  while (paths > in.least_paths && in.paths_bytes(paths) > share) paths = std::max(in.least_paths, paths * 7 / 8);
-  return paths;
+  const uint64_t most = std::max(in.least_paths, in.samples);
+  const uint64_t useful = std::clamp(kUsefulPaths, in.least_paths, most);
+  const uint64_t useful_bytes = in.paths_bytes(useful);
+  if (in.scene_page_bytes + useful_bytes <= in.left_bytes) return useful;
+  const uint64_t missing = in.scene_page_bytes > in.left_bytes ? in.scene_page_bytes - in.left_bytes : 0;
+  const uint64_t share = std::min({std::max(missing, useful_bytes), in.left_bytes / 2,
+                                   in.left_bytes - in.least_cache_bytes});
+  return paths_within(in, in.least_paths, most, share);
 }
 
 }  // namespace shoal

@@ -1,6 +1,8 @@
 // How memory is split between rays in flight and page cache.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "engine/split_memory.h"
 
 namespace shoal {
@@ -37,6 +39,31 @@ TEST(SplitMemory, StaysWithinWhatIsLeftAndAboveTheLeast) {
 
 TEST(SplitMemory, TakesAllSamplesOfASmallPictureWhenEverythingFits) {
   EXPECT_EQ(choose_paths_in_flight(input(1000, 100, 5000)), 5000u);
+}
+
+TEST(SplitMemory, ReadsLeastByItsModel) {
+  // Between what half a million paths take (121 MiB) and half of what is left the model alone decides.
+  for (uint64_t left = 400; left < 4000; left += 100) {
+    for (uint64_t scene = left; scene < 3 * left; scene += 250) {
+      const SplitInput in = input(left, scene, 1u << 30);
+      const auto cost = [&](uint64_t paths) {
+        const double b = static_cast<double>(in.paths_bytes(paths)), missing = static_cast<double>(scene - left) * kMiB;
+        return (missing + b) * (missing + b) / b;
+      };
+      double least = cost(1u << 19);
+      for (uint64_t paths = 1u << 19; in.paths_bytes(paths) <= in.left_bytes / 2; paths += 1u << 14) {
+        least = std::min(least, cost(paths));
+      }
+      EXPECT_LE(cost(choose_paths_in_flight(in)), least * 1.001) << left << " of " << scene;
+    }
+  }
+}
+
+TEST(SplitMemory, GivesPathsNoMoreThanHalf) {
+  const SplitInput in = input(1000, 1000000, 1u << 30);
+  const uint64_t paths = choose_paths_in_flight(in);
+  EXPECT_LE(in.paths_bytes(paths), in.left_bytes / 2);
+  EXPECT_GT(in.paths_bytes(paths + 1), in.left_bytes / 2);
 }
 
 }  // namespace
