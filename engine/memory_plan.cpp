@@ -129,7 +129,7 @@ Result<MemoryPlan> share_out(const SceneSizes& scene, const PictureOptions& pict
   }
   uint64_t paths = asked_paths;
   if (paths == 0 && queued) {
-    paths = choose_paths_in_flight({left, plan.scene_page_bytes(), least_pages, least_paths,
+    paths = choose_paths_in_flight({left, plan.scene_page_bytes(), scene.treelet_count, least_pages, least_paths,
                                     std::min<uint64_t>(samples, kMaxPathsInFlight), paths_bytes});
   }
   plan.paths_in_flight = static_cast<uint32_t>(queued ? paths : threads);

@@ -5,9 +5,10 @@
 namespace shoal {
 namespace {
 
-/// With fewer paths than these batches are so small that taking a treelet in hand costs more than tracing its rays: 2.3
-/// times the time with half of them, 7 times with an eighth (docs/decisions/0012). More were not seen to pay in memory.
-constexpr uint64_t kUsefulPaths = 1u << 19;
+/// With fewer paths batches are so small that taking a treelet in hand costs more than tracing its rays, wherever the
+/// pages are: 80 a treelet, and half a million in any scene. Measured (docs/decisions/0012): with 27 a treelet 2.3 times
+/// the time, with 7 seven times; more than 80 were not seen to pay in memory.
+constexpr uint64_t kUsefulPaths = 1u << 19, kUsefulPathsATreelet = 80;
 
 /// The most paths, from `least` to `most`, that take no more than `bytes`; `least` if none does.
 uint64_t paths_within(const SplitInput& in, uint64_t least, uint64_t most, uint64_t bytes) {
@@ -26,7 +27,8 @@ uint64_t paths_within(const SplitInput& in, uint64_t least, uint64_t most, uint6
 
 uint64_t choose_paths_in_flight(const SplitInput& in) {
   const uint64_t most = std::max(in.least_paths, in.samples);
-  const uint64_t useful = std::clamp(kUsefulPaths, in.least_paths, most);
+  const uint64_t useful = std::clamp(std::max(kUsefulPaths, kUsefulPathsATreelet * in.treelet_count),
+                                     in.least_paths, most);
   const uint64_t useful_bytes = in.paths_bytes(useful);
   if (in.scene_page_bytes + useful_bytes <= in.left_bytes) return useful;
   const uint64_t missing = in.scene_page_bytes > in.left_bytes ? in.scene_page_bytes - in.left_bytes : 0;

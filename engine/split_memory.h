@@ -21,6 +21,7 @@ namespace shoal {
 struct SplitInput {
   uint64_t left_bytes = 0;        ///< M: to be split
   uint64_t scene_page_bytes = 0;  ///< S: all pages decoded
+  uint64_t treelet_count = 0;
   uint64_t least_cache_bytes = 0;
   uint64_t least_paths = 0;
   uint64_t samples = 0;           ///< of the whole picture: more paths than these never exist

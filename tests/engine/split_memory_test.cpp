@@ -59,6 +59,13 @@ TEST(SplitMemory, ReadsLeastByItsModel) {
   }
 }
 
+TEST(SplitMemory, GivesSceneOfManyTreeletsMorePaths) {
+  SplitInput in = input(20000, 100, 1u << 30);
+  EXPECT_EQ(choose_paths_in_flight(in), 1u << 19);
+  in.treelet_count = 25000;
+  EXPECT_EQ(choose_paths_in_flight(in), 2'000'000u);
+}
+
 TEST(SplitMemory, GivesPathsNoMoreThanHalf) {
   const SplitInput in = input(1000, 1000000, 1u << 30);
   const uint64_t paths = choose_paths_in_flight(in);
