@@ -16,7 +16,7 @@ namespace {
 
 struct Arguments {
   RenderArguments render;
-  std::string output, png, stats, tonemap = "pbr-neutral";
+  std::string output, png, preview, stats, tonemap = "pbr-neutral";
   float exposure = 0;
 };
 
@@ -26,23 +26,33 @@ Status check_arguments(const Arguments& arguments) {
   if (!std::isfinite(arguments.exposure)) {
     return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
   }
-  for (const std::string& path : {arguments.output, arguments.png, arguments.stats}) {
+  for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
   }
   return {};
 }
 
-Status write_preview(const Arguments& arguments, const ExrImage& image) {
+Result<ToneMapOptions> tone_of(const Arguments& arguments) {
   SHOAL_ASSIGN_OR_RETURN(const ToneCurve curve, parse_tone_curve(arguments.tonemap));
+  return ToneMapOptions{curve, arguments.exposure};
+}
+
+/// The finished picture, under each of the names that are asked for.
+Status write_pngs(const Arguments& arguments, const ExrImage& image) {
+  if (arguments.png.empty() && arguments.preview.empty()) return {};
+  SHOAL_ASSIGN_OR_RETURN(const ToneMapOptions tone, tone_of(arguments));
   const std::vector<uint8_t> rgb = tone_map_image(image.channels[0].values, image.channels[1].values,
-                                                  image.channels[2].values, {curve, arguments.exposure});
-  return write_png(posix_file_system(), arguments.png, image.width, image.height, rgb);
+                                                  image.channels[2].values, tone);
+  for (const std::string& path : {arguments.png, arguments.preview}) {
+    if (!path.empty()) SHOAL_RETURN_IF_ERROR(write_png(posix_file_system(), path, image.width, image.height, rgb));
+  }
+  return {};
 }
 
 Status write_outputs(const Arguments& arguments, const PreparedRender& prepared, const RenderResult& result) {
   const ExrImage image = picture_image(result, prepared.scene, prepared.picture);
   SHOAL_RETURN_IF_ERROR(write_exr(posix_file_system(), arguments.output, image));
-  if (!arguments.png.empty()) SHOAL_RETURN_IF_ERROR(write_preview(arguments, image));
+  SHOAL_RETURN_IF_ERROR(write_pngs(arguments, image));
   if (arguments.stats.empty()) return {};
   const std::string json = stats_json(result, prepared.scene, prepared.picture, prepared.execution);
   return write_whole_file(posix_file_system(), arguments.stats, std::as_bytes(std::span(json)));
@@ -50,7 +60,9 @@ Status write_outputs(const Arguments& arguments, const PreparedRender& prepared,
 
 int run_render(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
-  auto prepared = prepare_render(arguments.render, {arguments.render.execution.order}, console);
+  RenderArguments asked = arguments.render;
+  asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
+  auto prepared = prepare_render(asked, {arguments.render.execution.order}, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
   RenderHooks hooks = console_hooks(console);
@@ -79,9 +91,11 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   CLI::App* sub = app.add_subcommand("render", "scene to picture");
   arguments->render.declare(*sub);
   sub->add_option("-o,--output", arguments->output, "the picture, .exr")->required();
-  sub->add_option("--png", arguments->png, "a preview as well, 8-bit sRGB");
-  sub->add_option("--tonemap", arguments->tonemap, "of the preview: pbr-neutral, none")->capture_default_str();
-  sub->add_option("--exposure", arguments->exposure, "of the preview, in stops")->capture_default_str();
+  sub->add_option("--png", arguments->png, "the picture as 8-bit sRGB as well");
+  sub->add_option("--preview", arguments->preview,
+                  "the same, written early from few samples and refreshed while rendering; finished at the end");
+  sub->add_option("--tonemap", arguments->tonemap, "of --png and --preview: pbr-neutral, none")->capture_default_str();
+  sub->add_option("--exposure", arguments->exposure, "of --png and --preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
   add_choice(*sub, "--order", arguments->render.execution.order, kOrders, " (the picture is the same)")
       ->type_name("ORDER");

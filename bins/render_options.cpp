@@ -262,11 +262,13 @@ RenderHooks console_hooks(Console& console) {
   hooks.stop = stop_on_signals();
   hooks.progress = [&console](const RenderProgress& p) {
     const double fraction = static_cast<double>(p.samples_done) / static_cast<double>(p.samples_total);
-    console.show_progress("rendering", fraction, p.seconds,
-                          fmt::format("{:.2f} M samples/s, {} read",
-                                      static_cast<double>(p.samples_done) / p.seconds * 1e-6,
-                                      format_bytes(p.disk_read_bytes)));
+    std::string detail = fmt::format("{:.2f} M samples/s, {} read",
+                                     static_cast<double>(p.samples_done) / p.seconds * 1e-6,
+                                     format_bytes(p.disk_read_bytes));
+    if (p.first_picture) detail += fmt::format(", first picture after {:.2f} s", p.first_picture->seconds);
+    console.show_progress("rendering", fraction, p.seconds, detail);
   };
+  hooks.warning = [&console](const std::string& message) { console.warning(message); };
   return hooks;
 }
 

@@ -41,7 +41,19 @@ bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered) {
   std::lock_guard guard(locks_[pixel % kLocks]);
   for (int c = 0; c < 3; ++c) p.rgb[c].add(fixed[c]);
   p.covered += covered ? 1 : 0;
+  ++p.added;
   return inside;
+}
+
+uint32_t Film::mean(uint32_t pixel, float rgb[3]) const {
+  Pixel p;
+  {
+    std::lock_guard guard(locks_[pixel % kLocks]);
+    p = pixels_[pixel];
+  }
+  const double scale = p.added > 0 ? 1.0 / p.added : 0.0;
+  for (int c = 0; c < 3; ++c) rgb[c] = static_cast<float>(p.rgb[c].to_double() * scale);
+  return p.added;
 }
 
 std::vector<float> Film::resolve(uint32_t samples) const {

@@ -36,6 +36,10 @@ class Film {
   /// Requires: finite values.
   bool add(uint32_t pixel, const Vec3& radiance, bool covered);
 
+  /// Mean of the samples that were added to a pixel by now, and how many those are (with none: black). May be asked
+  /// while others add.
+  uint32_t mean(uint32_t pixel, float rgb[3]) const;
+
   /// Mean over `samples`: width * height * 4 floats, RGBA, rows from the top; A is the covered fraction.
   std::vector<float> resolve(uint32_t samples) const;
 
@@ -47,7 +51,8 @@ class Film {
  private:
   struct Pixel {
     FixedPoint128 rgb[3];
-    uint64_t covered = 0;
+    uint32_t covered = 0;
+    uint32_t added = 0;  ///< samples
   };
   static constexpr uint32_t kLocks = 4096;
   uint32_t width_, height_;

@@ -20,7 +20,9 @@ Result<std::vector<float>> probe_luminances(FileSystem& fs, const Scene& scene, 
   PictureOptions probe = picture;
   probe.width = probe.height = 16;
   probe.samples = 4;
-  SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, probe, execution));
+  ExecutionOptions unseen = execution;
+  unseen.preview = {};
+  SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, probe, unseen));
   std::vector<float> values;
   for (size_t i = 0; i < result.rgba.size(); i += 4) {
     values.push_back(0.2126f * result.rgba[i] + 0.7152f * result.rgba[i + 1] + 0.0722f * result.rgba[i + 2]);

@@ -8,6 +8,7 @@
 
 #include "engine/film.h"
 #include "engine/path_ray.h"
+#include "engine/preview.h"
 #include "engine/process_memory.h"
 #include "engine/queued_paths.h"
 #include "engine/render.h"
@@ -75,6 +76,7 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   plan.table_bytes = scene.table_bytes;
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * kFloatPixelBytes;
+  if (!execution.preview.path.empty()) plan.preview_bytes = Preview::bytes(picture.width, picture.height);
   plan.read_buffer_bytes = threads * (pages.largest + 2 * kPageAlignment);  // direct reads need their own
   plan.scratch_bytes = kProcessGrowthBytes + threads * kThreadBytes +
                        PageCache::overhead_bytes(scene.file, PagingOptions{.read_depth = 0}) +

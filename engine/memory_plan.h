@@ -25,7 +25,7 @@ struct MemoryPlan {
   uint64_t top_tree_bytes = 0;     ///< nodes, entries and instances
   uint64_t table_bytes = 0;        ///< other tables of the scene, light distributions, environment
   uint64_t film_bytes = 0;         ///< sums, and the picture while it is written
-  uint64_t preview_bytes = 0;      ///< --preview: the coarse picture and what is written
+  uint64_t preview_bytes = 0;      ///< --preview: its pixels, and the file before it is written
   uint64_t path_state_bytes = 0;   ///< path states and the lists in which they wait
   uint64_t ray_bytes = 0;          ///< rays and their queues
   uint64_t cache_bytes = 0;        ///< pages of geometry, attributes and textures

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "engine/preview.h"
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"
 #include "engine/treelet_scheduler.h"
@@ -38,6 +39,14 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   return {};
 }
 
+/// How often a render with a preview goes over the whole picture before the order of tiles begins: until every pixel has
+/// a sample where all pages fit in the cache. Else what is in flight would be spread over the whole scene all that time:
+/// 2.4 % of a picture were done when 3.8 % are without a preview (demo of 1 G triangles, 1920 x 1080, cap 1.5G, 25 s).
+uint32_t coarse_levels(const MemoryPlan& plan) {
+  constexpr uint32_t kLevelsOutOfCore = 3;
+  return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
+}
+
 }  // namespace
 
 Status check_picture(const PictureOptions& picture) {
@@ -68,8 +77,12 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
 
   const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera],
                       picture.width, picture.height);
-  const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample);
+  const bool previewed = !execution.preview.path.empty();
+  const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample,
+                            previewed ? coarse_levels(plan) : 0);
   Film film(picture.width, picture.height);
+  std::optional<Preview> preview;
+  if (previewed) preview.emplace(fs, execution.preview, film, samples, execution.threads, start, hooks.warning);
   const bool queued = execution.order == Order::kQueued;
   std::unique_ptr<QueuedPaths> paths;
   const std::vector<TreeletId> page_treelets = treelet_of_pages(scene);
@@ -91,6 +104,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
+  if (preview) context.preview = &*preview;
   if (queued) {
     const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
         execution.policy, scaled_policy(execution.policy_options, execution.paging,
@@ -106,6 +120,13 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
 
   RenderResult result;
+  if (preview) {
+    preview->show_if_none();
+    result.first_picture = preview->first();
+    result.previews_count = preview->shown_count();
+    result.preview_seconds = preview->seconds();
+    preview.reset();
+  }
   result.rgba = film.resolve(picture.samples);
   result.counters = context.counters;
   result.plan = plan;

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "engine/memory_plan.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
+#include "engine/tonemap.h"
 #include "io/page_loader.h"
 #include "io/result.h"
 #include "queues/drain_policy.h"
@@ -29,6 +31,12 @@ struct PictureOptions {
 
 enum class Order : uint8_t { kQueued, kDepthFirst };
 
+/// A picture that is written while the render goes on (engine/preview.h).
+struct PreviewOptions {
+  std::string path;  ///< .png; empty: none
+  ToneMapOptions tone;
+};
+
 struct ExecutionOptions {
   Order order = Order::kQueued;
   unsigned threads = 0;             ///< 0: all
@@ -40,17 +48,26 @@ struct ExecutionOptions {
   PolicyOptions policy_options;
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
+  PreviewOptions preview;
+};
+
+/// The first preview that was there to be looked at.
+struct FirstPicture {
+  double seconds = 0;      ///< since the render began, until the file stood under its name
+  double pixel_share = 0;  ///< of the pixels, that had a sample of their own; the others showed a neighbour
 };
 
 struct RenderProgress {
   uint64_t samples_done = 0, samples_total = 0;
   uint64_t disk_read_bytes = 0;
   double seconds = 0;
+  std::optional<FirstPicture> first_picture;  ///< as soon as there is one; never without a preview
 };
 
 struct RenderHooks {
   std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
   std::function<void(const RenderProgress&)> progress;  ///< may be empty; now and then, one call at a time
+  std::function<void(const std::string&)> warning;      ///< may be empty; what went wrong and does not end the render
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
 };
 
@@ -62,6 +79,9 @@ struct RenderResult {
   unsigned threads = 0;
   uint64_t peak_cache_bytes = 0;
   double picture_share = 1;  ///< of the pixels, that were rendered (PictureOptions::tile_sample)
+  std::optional<FirstPicture> first_picture;  ///< none without a preview, or when none could be written
+  uint32_t previews_count = 0;                ///< written while rendering
+  double preview_seconds = 0;                 ///< that one thread spent on them, or another
 };
 
 /// Sizes and samples that can be rendered. Fails with: kUsage.

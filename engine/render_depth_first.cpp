@@ -1,11 +1,17 @@
 // Depth-first: each path alone from camera to end, its treelets pinned on demand (least recently used leave). The
 // baseline that the queued order is compared with: same pages, same kernels, same shading.
+#include <chrono>
+#include <thread>
+
 #include "engine/render_worker.h"
 
 namespace shoal {
 namespace {
 
 constexpr uint64_t kSamplesPerGrab = 256;
+/// Of the first lattice of a preview: the other threads wait for who has the last ones.
+constexpr uint64_t kFirstSamplesPerGrab = 16;
+constexpr std::chrono::microseconds kFirstLatticeWait{200};
 
 class DepthFirstWorker {
  public:
@@ -13,13 +19,14 @@ class DepthFirstWorker {
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed)) {
-      const uint64_t first = context_.next_sample.fetch_add(kSamplesPerGrab);
-      const uint64_t last = std::min(first + kSamplesPerGrab, context_.samples.count());
-      if (first >= last) break;
-      for (uint64_t index = first; index < last && run_path(index); ++index) {
+      const bool first_lattice = context_.next_sample < context_.samples.first_lattice_count();
+      const SampleRange samples = context_.begin_samples(first_lattice ? kFirstSamplesPerGrab : kSamplesPerGrab);
+      if (samples.first == context_.samples.count()) break;
+      for (uint64_t index = samples.first; index < samples.last && run_path(index); ++index) {
       }
-      context_.samples_done += last - first;
+      context_.samples_done += samples.size();
       worker_.report_progress();
+      if (samples.size() == 0) std::this_thread::sleep_for(kFirstLatticeWait);
     }
     worker_.hand_in();
   }

@@ -49,22 +49,22 @@ class QueuedWorker {
   /// Whether so many new paths could begin now.
   bool room_for(uint32_t paths) const {
     return paths_.free_count() >= paths && !context_.ended.load(std::memory_order_relaxed) &&
-           context_.next_sample.load(std::memory_order_relaxed) < context_.samples.count();
+           context_.may_begin();
   }
 
   /// Begins up to `wanted` new paths: addresses their camera rays and queues them.
   void admit(uint32_t wanted) {
     uint32_t path = kNoIndex;
     const uint32_t taken = paths_.take_free(wanted, &path);
-    const uint64_t first = context_.next_sample.fetch_add(taken);
-    for (uint64_t index = first; index < first + taken; ++index) {
+    const SampleRange samples = context_.begin_samples(taken);
+    for (uint32_t i = 0; i < taken; ++i) {
       const uint32_t current = path;
       path = paths_.state(current).next_free;
-      if (index >= context_.samples.count()) {
+      if (i >= samples.size()) {
         paths_.give_back(current);
         continue;
       }
-      rays_[0] = worker_.begin_path(index, current, paths_.state(current));
+      rays_[0] = worker_.begin_path(samples.first + i, current, paths_.state(current));
       ray_count_ = 1;
       handle_rays();
     }

@@ -158,6 +158,13 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();
   json["render_seconds"] = result.seconds;
   json["picture_share"] = result.picture_share;
+  const auto first = [&](double FirstPicture::* member) {
+    return result.first_picture ? Json((*result.first_picture).*member) : Json(nullptr);
+  };
+  json["first_picture_seconds"] = first(&FirstPicture::seconds);
+  json["first_picture_pixel_share"] = first(&FirstPicture::pixel_share);
+  json["previews_count"] = result.previews_count;
+  json["preview_seconds"] = result.preview_seconds;
   json["threads_count"] = result.threads;
   json["rays_per_second"] = static_cast<double>(rays.rays_traced_count) / result.seconds;
   json["counters"] = Json::parse(counters_json(result.counters));

@@ -7,6 +7,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "engine/preview.h"
+
 namespace shoal {
 
 double now_seconds() {
@@ -17,6 +19,15 @@ void RenderContext::fail(Error new_error) {
   std::lock_guard guard(mutex);
   if (error.ok()) error = std::move(new_error);
   ended.store(true, std::memory_order_relaxed);
+}
+
+SampleRange RenderContext::begin_samples(uint64_t wanted) {
+  uint64_t first = next_sample.load(std::memory_order_relaxed), last = 0;
+  do {
+    last = std::min(first + wanted, begin_limit());
+    if (last <= first) return {first, first};
+  } while (!next_sample.compare_exchange_weak(first, last));
+  return {first, last};
 }
 
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work) {
@@ -182,6 +193,7 @@ void RenderWorker::report_progress() {
     context_.fail({ErrorCode::kStopped, "the render was stopped before it was complete"});
   }
   if (Status failure = context_.cache.failure(); !failure.ok()) context_.fail(std::move(failure).error());
+  if (context_.preview != nullptr && !context_.ended) context_.preview->show_when_due(context_.samples_done);
   if (!context_.hooks.progress) return;
   const double now = now_seconds();
   if (now < next_report_seconds_ || !context_.mutex.try_lock()) return;
@@ -189,7 +201,8 @@ void RenderWorker::report_progress() {
   std::lock_guard guard(context_.mutex, std::adopt_lock);
   context_.hooks.progress({context_.samples_done, context_.samples.count(),
                            context_.disk_read_bytes + context_.cache.background_read_bytes(),
-                           now - context_.start_seconds});
+                           now - context_.start_seconds,
+                           context_.preview != nullptr ? context_.preview->first() : std::nullopt});
 }
 
 void add_cache_counters(const CacheCounters& cache, RenderCounters& c) {

@@ -15,6 +15,14 @@
 
 namespace shoal {
 
+class Preview;
+
+/// Samples begun together.
+struct SampleRange {
+  uint64_t first = 0, last = 0;  ///< indices of SampleOrder; `last` is not among them
+  uint64_t size() const { return last - first; }
+};
+
 /// Everything the threads of one render share.
 struct RenderContext {
   const Scene& scene;
@@ -26,6 +34,7 @@ struct RenderContext {
   PageCache& cache;
   Film& film;
   unsigned threads;
+  Preview* preview = nullptr;  ///< or none
 
   std::atomic<uint64_t> next_sample{0};
   std::atomic<uint64_t> samples_done{0};
@@ -37,6 +46,15 @@ struct RenderContext {
   double start_seconds = 0;
 
   void fail(Error error);
+  /// Takes up to `wanted` samples that nobody has begun; none are left, for now or for good, when it is empty.
+  SampleRange begin_samples(uint64_t wanted);
+  bool may_begin() const { return next_sample.load(std::memory_order_relaxed) < begin_limit(); }
+
+ private:
+  /// With a preview nothing else begins before the first lattice is complete: few rays would wait for ever where many do.
+  uint64_t begin_limit() const {
+    return samples_done >= samples.first_lattice_count() ? samples.count() : samples.first_lattice_count();
+  }
 };
 
 /// Seconds of a monotonic clock.
@@ -83,7 +101,7 @@ class RenderWorker {
   }
   RenderCounters& counters() { return counters_; }
   CacheCounters& cache_counters() { return cache_counters_; }
-  /// Calls the progress hook now and then, unless another thread is in it; sees stop requests.
+  /// Shows the preview and calls the progress hook now and then, unless another thread is at it; sees stop requests.
   void report_progress();
   /// Adds this worker's counters to the context. Called once, at the end.
   void hand_in();

@@ -1,9 +1,15 @@
 // The order in which samples of the picture are begun: tiles of 32 x 32 pixels row by row, in a tile all samples of
 // a pixel after one another, so that the paths in flight are close together. The picture does not depend on it.
 //
+// Coarse first (for a preview): before all others come the first samples of a sparse lattice of pixels, then of the
+// lattices between, each half as wide as the one before (as in interlaced PNG), as many as were asked for. All else
+// comes in the order of tiles; where that meets a sample which is done, it takes one of those for which the first had
+// taken the place.
+//
 // With `tile_sample` N only one in N tiles is rendered: of every N tiles in that order the one that a fixed hash names,
 // so that they are spread over the picture and the same in every order. Called by engine/render_*. Immutable, any
-// number of threads. Cost: a few divisions, and a binary search among the tiles when some are left out.
+// number of threads. Cost: a few divisions, a binary search among the tiles when some are left out, and one among the
+// lattices.
 #pragma once
 
 #include <algorithm>
@@ -19,46 +25,82 @@ struct PixelSample {
 class SampleOrder {
  public:
   /// Requires: tile_sample > 0.
-  SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample = 1);
+  /// `coarse_levels`: how often the picture is gone over with a sample in few pixels, before the rest; 0: never.
+  SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample = 1, uint32_t coarse_levels = 0);
+  static constexpr uint32_t kAllLevels = 32;  ///< until every pixel has a sample
 
   uint64_t count() const { return pixel_count_ * samples_; }
   /// Pixels that are rendered.
   uint64_t pixel_count() const { return pixel_count_; }
+  /// Coarse first: samples of the first lattice, which are those with the lowest indices. Else 0.
+  uint64_t first_lattice_count() const { return first_lattice_count_; }
+  /// Coarse first: between the pixels of the first lattice, in x and y; a power of two. 1 when tiles are left out: what
+  /// is first is not a lattice of the picture then.
+  uint32_t first_spacing() const { return tiles_.empty() && !lattices_.empty() ? lattices_[0].spacing : 1; }
 
   /// Requires: index < count().
   PixelSample at(uint64_t index) const {
-    const uint64_t pixel = index / samples_;
-    const uint32_t sample = static_cast<uint32_t>(index % samples_);
-    if (tiles_.empty()) return at_pixel(pixel, sample);
-    const auto tile = std::upper_bound(tiles_.begin(), tiles_.end(), pixel,
-                                       [](uint64_t value, const Tile& t) { return value < t.first; }) - 1;
-    return at_pixel(tile->pixel + (pixel - tile->first), sample);
+    return lattices_.empty() ? at_pixel(index / samples_, static_cast<uint32_t>(index % samples_)) : coarse_first(index);
   }
 
  private:
   static constexpr uint32_t kTile = 32;
+  /// Pixels of the first lattice: enough to see what the picture shows. Twice as wide it would have fewer.
+  static constexpr uint64_t kFirstLatticePixels = 1024;
+  static constexpr uint32_t kWidestSpacing = 256;
   struct Tile {
     uint64_t first;  ///< its first pixel among those that are rendered
     uint64_t pixel;  ///< ... and among all
   };
+  struct Lattice {
+    uint64_t first;          ///< index of its first sample
+    uint32_t x, y, spacing;  ///< its first pixel, and how far apart they are
+    uint32_t across, down;   ///< pixels; none where the picture is too small
+  };
+  struct Place {
+    uint32_t x, y;
+  };
 
-  /// `pixel` counts all pixels of the picture, tile by tile.
-  PixelSample at_pixel(uint64_t pixel, uint32_t sample) const {
-    const uint64_t row_pixels = uint64_t{width_} * kTile;  // of a full row of tiles
+  void leave_out_tiles(uint32_t tile_sample);
+  void add_lattices(uint32_t levels);
+  void add_lattice(uint32_t x, uint32_t y, uint32_t spacing, uint32_t width, uint32_t height);
+  PixelSample coarse_first(uint64_t index) const;
+  PixelSample at_lattice(uint64_t index) const;
+  /// Index of the pixel's sample 0 when that is in a lattice, else kNone.
+  uint64_t lattice_index(uint64_t pixel) const;
+  static constexpr uint64_t kNone = ~0ull;
+
+  /// The `pixel`-th of a picture, tile by tile.
+  static Place in_tiles(uint64_t pixel, uint32_t width, uint32_t height) {
+    const uint64_t row_pixels = uint64_t{width} * kTile;  // of a full row of tiles
     const uint32_t tile_y = static_cast<uint32_t>(pixel / row_pixels);
-    const uint32_t tile_height = std::min(kTile, height_ - tile_y * kTile);
+    const uint32_t tile_height = std::min(kTile, height - tile_y * kTile);
     uint64_t rest = pixel - tile_y * row_pixels;
     const uint64_t tile_pixels = uint64_t{kTile} * tile_height;
     const uint32_t tile_x = static_cast<uint32_t>(rest / tile_pixels);
-    const uint32_t tile_width = std::min(kTile, width_ - tile_x * kTile);
+    const uint32_t tile_width = std::min(kTile, width - tile_x * kTile);
     rest -= tile_x * tile_pixels;
     return {tile_x * kTile + static_cast<uint32_t>(rest % tile_width),
-            tile_y * kTile + static_cast<uint32_t>(rest / tile_width), sample};
+            tile_y * kTile + static_cast<uint32_t>(rest / tile_width)};
+  }
+
+  /// `pixel` counts those that are rendered.
+  PixelSample at_pixel(uint64_t pixel, uint32_t sample) const {
+    if (!tiles_.empty()) {
+      const auto tile = std::upper_bound(tiles_.begin(), tiles_.end(), pixel,
+                                         [](uint64_t value, const Tile& t) { return value < t.first; }) - 1;
+      pixel = tile->pixel + (pixel - tile->first);
+    }
+    const Place place = in_tiles(pixel, width_, height_);
+    return {place.x, place.y, sample};
   }
 
   uint32_t width_, height_, samples_;
   uint64_t pixel_count_;
-  std::vector<Tile> tiles_;  ///< empty: all
+  uint64_t first_lattice_count_ = 0, lattices_count_ = 0;  ///< samples
+  uint32_t finest_spacing_ = 1;                            ///< of all lattices together
+  std::vector<Tile> tiles_;        ///< empty: all
+  std::vector<Lattice> lattices_;  ///< empty: not coarse first. Of the picture, or of the row of pixels of all tiles_
 };
 
 }  // namespace shoal

@@ -24,7 +24,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
       {"build", {"--output", "--treelet-size", "--max-memory", "--threads"}},
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
-                  "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png",
+                  "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
                   "--tonemap", "--exposure",   "--stats",          "--order",     "queued, depth-first"}},
       {"compare", {"--orders", "--out", "--width", "--spp", "--max-memory"}},
       {"info", {"--json"}},

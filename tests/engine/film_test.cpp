@@ -47,6 +47,20 @@ TEST(Film, SaysWhenARadianceIsClamped) {
   EXPECT_EQ(film.resolve(2)[0], (Film::kMaxRadiance + 1) / 2);
 }
 
+TEST(Film, GivesTheMeanOfWhatAPixelHasSoFar) {
+  Film film(2, 1);
+  float rgb[3] = {1, 1, 1};
+  EXPECT_EQ(film.mean(1, rgb), 0u);
+  EXPECT_EQ(rgb[0], 0.0f);
+  film.add(1, Vec3(1, 2, 3), true);
+  film.add(1, Vec3(2, 2, 0), false);
+  EXPECT_EQ(film.mean(1, rgb), 2u);
+  EXPECT_EQ((std::vector<float>(rgb, rgb + 3)), (std::vector<float>{1.5f, 2, 1.5f}));
+  const std::vector<float> rgba = film.resolve(2);
+  EXPECT_EQ((std::vector<float>(rgba.begin() + 4, rgba.end())), (std::vector<float>{1.5f, 2, 1.5f, 0.5f}));
+  EXPECT_EQ(film.mean(0, rgb), 0u);
+}
+
 TEST(Film, LosesNothingWhenThreadsShareAPixel) {
   Film film(1, 1);
   std::vector<std::thread> threads;
