@@ -72,6 +72,8 @@ TEST(MemoryCap, TheSmallestCapWorksForAPictureThatOutweighsTheScene) {
   // 57 MB of film and picture: what writing takes beside it would show.
   expect_smallest_works(folder, {"render", folder / "terrain.shoal", "--width", "1000", "--height", "800", "--spp", "1",
                                  "--bounces", "1", "--threads", "2", "--quiet", "--png", folder / "out.png"});
+  expect_smallest_works(folder, {"render", folder / "terrain.shoal", "--width", "1000", "--height", "800", "--spp", "1",
+                                 "--bounces", "1", "--threads", "2", "--quiet", "--preview", folder / "out.png"});
 }
 
 TEST(MemoryCap, TheSmallestCapWorksForAnEnvironmentThatOutweighsTheScene) {

@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <thread>
 
+#include "io/image.h"
 #include "tests/bins/small_scene.h"
 
 namespace shoal::testing {
@@ -22,6 +24,7 @@ TEST(Output, FoldersThatAreMissingAreNamed) {
   const std::string missing = folder / "missing/out";
   expect_error(run_shoal(folder, render(folder, {"-o", missing + ".exr"})), 6, {"missing/out.exr", "No such file"});
   expect_error(run_shoal(folder, render(folder, join(good, {"--png", missing + ".png"}))), 6, {"missing/out.png"});
+  expect_error(run_shoal(folder, render(folder, join(good, {"--preview", missing + ".png"}))), 6, {"missing/out.png"});
   expect_error(run_shoal(folder, render(folder, join(good, {"--stats", missing + ".json"}))), 6,
                {"missing/out.json"});
   expect_error(run_shoal(folder, {"build", folder / "terrain/terrain.gltf", "-o", missing + ".shoal"}), 6,
@@ -65,6 +68,51 @@ TEST(Output, APictureThatWasThereStaysWhenARenderFails) {
   expect_error(run_shoal(folder, {"render", folder / "missing.shoal", "-o", folder / "out.exr"}), 3,
                {"missing.shoal"});
   EXPECT_EQ(file_text(folder / "out.exr"), "an older picture");
+}
+
+TEST(Output, APreviewEndsAsTheFinishedPicture) {
+  const TemporaryFolder folder;
+  make_terrain(folder, "1K");
+  for (const char* order : {"queued", "depth-first"}) {
+    expect_exit(run_shoal(folder, render(folder, {"-o", folder / "out.exr", "--png", folder / "out.png", "--preview",
+                                                  folder / "preview.png", "--stats", folder / "out.json", "--exposure",
+                                                  "1.5", "--order", order})),
+                0);
+    EXPECT_EQ(file_text(folder / "preview.png"), file_text(folder / "out.png"));
+    const nlohmann::json stats = nlohmann::json::parse(file_text(folder / "out.json"), nullptr, false);
+    EXPECT_GT(stats["first_picture_seconds"], 0);
+    EXPECT_LE(stats["first_picture_seconds"], stats["render_seconds"]);
+    EXPECT_GT(stats["first_picture_pixel_share"], 0);
+    EXPECT_GE(stats["previews_count"], 1);
+    EXPECT_GT(stats["memory"]["preview_bytes"], 0);
+    std::filesystem::remove(folder / "preview.png");
+  }
+  expect_exit(run_shoal(folder, render(folder, {"-o", folder / "out.exr", "--stats", folder / "out.json"})), 0);
+  const nlohmann::json stats = nlohmann::json::parse(file_text(folder / "out.json"), nullptr, false);
+  EXPECT_TRUE(stats["first_picture_seconds"].is_null());
+  EXPECT_TRUE(stats["first_picture_pixel_share"].is_null());
+  EXPECT_EQ(stats["memory"]["preview_bytes"], 0);
+}
+
+TEST(Output, APreviewStaysWhenARenderIsStopped) {
+  const TemporaryFolder folder;
+  make_terrain(folder, "1K");
+  for (const char* order : {"queued", "depth-first"}) {
+    Program program(folder, {SHOAL_BINARY, "render", folder / "terrain.shoal", "-o", folder / "out.exr", "--preview",
+                             folder / "preview.png", "--width", "512", "--height", "512", "--spp", "100000",
+                             "--progress", "json", "--order", order});
+    while (program.running() && program.err().find("first picture after") == std::string::npos) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    program.send(SIGINT);
+    expect_exit(program.wait(std::chrono::seconds(60)), 9);
+    const std::string png = file_text(folder / "preview.png");
+    const auto preview = decode_image(std::as_bytes(std::span(png)), "preview.png", 1 << 20);
+    ASSERT_TRUE(preview.ok()) << preview.error().message;
+    EXPECT_EQ(preview.value().width, 512u);
+    EXPECT_THAT(folder.names(), ::testing::ElementsAre("preview.png", "terrain", "terrain.shoal"));
+    std::filesystem::remove(folder / "preview.png");
+  }
 }
 
 TEST(Output, SignalsStopARenderWithCodeNineAndNoFile) {

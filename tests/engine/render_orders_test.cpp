@@ -26,6 +26,7 @@ struct Variation {
   const char* policy = "resident-first";
   uint32_t queue_capacity = 4096;
   PagingOptions paging = {};
+  bool preview = false;
 };
 
 const Variation kVariations[] = {
@@ -50,6 +51,12 @@ const Variation kVariations[] = {
      .paging = {.read_depth = 2, .loader_threads = 3, .backend = ReadBackend::kThreads, .eviction = "least-demand"}},
     {.name = "treelets of 4 KiB, sweep, smallest cache", .treelet_bytes = 4u << 10, .rays_in_flight = 5000,
      .smallest_cache = true, .policy = "sweep"},
+    {.name = "with a preview", .preview = true},
+    {.name = "with a preview, depth-first, three threads", .order = Order::kDepthFirst, .threads = 3, .preview = true},
+    {.name = "with a preview, smallest everything", .treelet_bytes = 4u << 10, .threads = 3, .rays_in_flight = 64,
+     .smallest_cache = true, .preview = true},
+    {.name = "with a preview, one thread, full", .threads = 1, .rays_in_flight = 20000, .policy = "full",
+     .queue_capacity = 100, .preview = true},
     {.name = "treelets of 4 MiB", .treelet_bytes = 4u << 20},
     {.name = "treelets of 64 KiB, depth-first", .treelet_bytes = 64u << 10, .order = Order::kDepthFirst},
 };
@@ -97,8 +104,14 @@ class RenderOrders : public ::testing::Test {
     if (v.smallest_cache) {
       execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
     }
+    if (v.preview) execution.preview.path = (folder_ / "preview.png").string();
     const auto result = render(fs, scene.value(), picture, execution);
     EXPECT_TRUE(result.ok()) << v.name << ": " << result.error().message;
+    if (result.ok()) {
+      EXPECT_EQ(result.value().first_picture.has_value(), v.preview) << v.name;
+      EXPECT_EQ(result.value().previews_count > 0, v.preview) << v.name;
+      EXPECT_EQ(std::filesystem::remove(folder_ / "preview.png"), v.preview) << v.name;
+    }
     return result.ok() ? result.value().rgba : std::vector<float>{};
   }
 
@@ -161,6 +174,7 @@ TEST_F(RenderOrders, ASampleOfTilesHasThePixelsOfTheWholePicture) {
   const std::vector<float> sample = render_variation(gltf, picture, {.name = "one in four"});
   const std::vector<float> depth_first =
       render_variation(gltf, picture, {.name = "one in four, depth-first", .order = Order::kDepthFirst});
+  EXPECT_EQ(sample, render_variation(gltf, picture, {.name = "one in four, with a preview", .preview = true}));
   ASSERT_EQ(whole.size(), sample.size());
   EXPECT_EQ(sample, depth_first);
   size_t lit = 0, black = 0;
