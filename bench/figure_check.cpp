@@ -50,6 +50,7 @@ Figure figure_check(const Setup& asked) {
   Policies policies;
   policies.drains = {"resident-first"}, policies.evictions = {"least-recent"};
   add("policies", figure_policies(setup, policies));
+  add("first-picture", figure_first_picture(setup, 0));
   return all;
 }
 

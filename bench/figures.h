@@ -53,6 +53,10 @@ struct Policies {
 /// Every drain policy with every eviction policy, with reads ahead and without.
 Figure figure_policies(const Setup& setup, const Policies& policies);
 
+/// Seconds until the first picture of a render with a preview, beside those of reading every page once.
+/// `cap_bytes` 0: the program's own choice.
+Figure figure_first_picture(const Setup& setup, uint64_t cap_bytes);
+
 /// All of them on a small scene of its own, so that they cannot rot: the figures mean nothing.
 Figure figure_check(const Setup& setup);
 

@@ -1,7 +1,7 @@
 // bench/out_of_core: the claims about scenes that do not fit in memory, a subcommand a figure (docs/measuring.md).
 // Every render is a process of its own, in a memory control group where the figure asks for one.
 //
-//   bench/out_of_core cap-held | quarter | rivals | amplification | split | random | policies | check
+//   bench/out_of_core cap-held | quarter | rivals | amplification | split | random | policies | first-picture | check
 //   [options: --help]
 #include <fmt/format.h>
 
@@ -102,6 +102,10 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
   policies->add_option("--drains", a.policies.drains, "drain policies")->delimiter(',')->capture_default_str();
   policies->add_option("--evictions", a.policies.evictions, "eviction policies")->delimiter(',')->capture_default_str();
   policies->callback([&] { figure = [&] { return figure_policies(a.setup, a.policies); }; });
+
+  CLI::App* first = declare_figure(app, a, "first-picture", "time to a first picture, and of reading the scene once");
+  first->add_option("--cap", a.cap_bytes, "such as 512M")->transform(CLI::AsSizeValue(false));
+  first->callback([&] { figure = [&] { return figure_first_picture(a.setup, a.cap_bytes); }; });
 
   CLI::App* check = declare_figure(app, a, "check", "all of them on a small scene, to see that they work", false);
   check->callback([&] { figure = [&] { return figure_check(a.setup); }; });
