@@ -13,7 +13,8 @@ Figure figure_random(const Setup& setup, const RandomRays& random) {
       setup, "random",
       {setup.this_program, "random-rays", setup.scene, "--stats", setup.folder + "/random.json", "--rays",
        std::to_string(random.rays), "--in-flight", std::to_string(random.in_flight), "--page-cache",
-       std::to_string(cache), "--policy", random.policy, "--threads", std::to_string(setup.threads)},
+       std::to_string(cache), "--policy", random.policy, "--rays-ahead",
+       std::to_string(random.rays_ahead), "--threads", std::to_string(setup.threads)},
       nullptr);
   if (!run.ok()) give_up("the rays failed: " + run.process.output);
   const double bytes = run.stats["disk_read_bytes"], loaded = run.stats["treelet_load_bytes"];

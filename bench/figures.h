@@ -41,6 +41,7 @@ struct RandomRays {
   uint64_t rays = 8'000'000, in_flight = 4'000'000;
   double share = 0.25;
   std::string policy = "resident-first";
+  uint32_t rays_ahead = 0;  ///< of the policy; 0: its default
 };
 /// Rays from random places of the whole scene into random directions: what no order of the picture helps with.
 Figure figure_random(const Setup& setup, const RandomRays& random);

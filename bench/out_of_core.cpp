@@ -95,6 +95,7 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
   random->add_option("--in-flight", a.random.in_flight, "at once")->transform(kCounts)->capture_default_str();
   random->add_option("--share", a.random.share, "of the pages in the cache")->capture_default_str();
   random->add_option("--policy", a.random.policy, "which queue is drained next")->capture_default_str();
+  random->add_option("--rays-ahead", a.random.rays_ahead, "reads ahead once fewer rays wait in memory (0: as renders)");
   random->callback([&] { figure = [&] { return figure_random(a.setup, a.random); }; });
 
   CLI::App* policies = declare_figure(app, a, "policies", "drain policies, eviction policies, reads ahead");
@@ -139,6 +140,7 @@ void declare_random_rays(CLI::App& app, RandomRun& r, std::function<Status()>& c
   sub->add_option("--in-flight", r.in_flight, "at once")->required();
   sub->add_option("--page-cache", r.page_cache_bytes, "bytes of decoded treelets kept")->required();
   sub->add_option("--policy", r.policy, "which queue is drained next");
+  sub->add_option("--rays-ahead", r.rays_ahead, "reads ahead once fewer rays wait in memory");
   sub->add_option("--threads", r.threads, "0: all");
   sub->callback([&] { child = [&r] { return trace_random_rays(r); }; });
 }

@@ -220,7 +220,7 @@ Status trace_random_rays(const RandomRun& run) {
         return id == kNoIndex ? PageDemand() : PageDemand(slots.waiting(id), batches.of(id));
       },
       PagingOptions{});
-  const PolicyOptions options = scaled_policy({}, {}, treelets, in_flight);
+  const PolicyOptions options = scaled_policy({.rays_ahead = run.rays_ahead}, {}, treelets, in_flight);
   const std::unique_ptr<DrainPolicy> policy = make_drain_policy(run.policy, options);
   if (policy == nullptr) return Error{ErrorCode::kUsage, "unknown policy " + run.policy};
   TreeletScheduler scheduler(scene, slots, cache, *policy, batches, page_treelets);

@@ -16,6 +16,7 @@ namespace shoal::bench {
 struct RandomRun {
   std::string scene, stats, policy = "resident-first";
   uint64_t rays = 0, in_flight = 0, page_cache_bytes = 0;
+  uint32_t rays_ahead = 0;  ///< as of `shoal render`; 0: from the rays in flight
   unsigned threads = 0;
 };
 
