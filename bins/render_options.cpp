@@ -288,10 +288,10 @@ std::string describe_plan(const MemoryPlan& plan) {
 }
 
 std::string describe_plan(const BuildMemoryPlan& plan) {
-  return fmt::format("memory: cap {}; process {}, document {}, tables {}, coverage {}, writing {}; then reading {} and "
-                     "sorting {}, or one chunk {} and {} pages in flight {}",
-                     format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.document_bytes),
-                     format_bytes(plan.tables_bytes), format_bytes(plan.coverage_bytes),
+  return fmt::format("memory: cap {}; process {}, threads {}, document {}, tables {}, coverage {}, writing {}; then "
+                     "reading {} and sorting {}, or one chunk {} and {} pages in flight {}",
+                     format_bytes(plan.cap_bytes), format_bytes(plan.process_bytes), format_bytes(plan.threads_bytes),
+                     format_bytes(plan.document_bytes), format_bytes(plan.tables_bytes), format_bytes(plan.coverage_bytes),
                      format_bytes(plan.writing_bytes), format_bytes(plan.reading_bytes),
                      format_bytes(plan.buffers_bytes), format_bytes(plan.chunk_bytes), plan.pages_in_flight,
                      format_bytes(plan.pages_bytes));

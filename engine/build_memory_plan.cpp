@@ -20,8 +20,10 @@ namespace {
 constexpr uint64_t kMiB = 1ull << 20;
 /// Program, libraries, stacks of the threads and what the allocator keeps: 13 MiB were seen.
 constexpr uint64_t kProcessBytes = 16 * kMiB;
-/// Of a thread: its stack and its part of the allocator.
-constexpr uint64_t kThreadBytes = kMiB / 2;
+/// Of a thread: its stack, its part of the allocator, and its staging of direct reads that are not aligned (256 KiB).
+constexpr uint64_t kThreadBytes = kMiB * 3 / 4;
+/// What a tree can be built of at once: its indices have 32 bits, and a binary tree has two nodes a triangle.
+constexpr uint64_t kMaxChunkTriangles = (1ull << 31) - 1;
 /// The page writer: a page raw, compressed and padded, beside what is written behind.
 constexpr uint64_t kPageWriterBytes = kWriteBehindBytes + 2 * kMiB;
 /// A treelet: records of its pages, entries, the binary and the wide tree above it, and the copies of these while the
@@ -88,23 +90,25 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
   plan.writing_bytes = kPageWriterBytes;
   const uint64_t resident = plan.process_bytes + plan.document_bytes + plan.tables_bytes + plan.coverage_bytes +
                             plan.writing_bytes;
-  if (resident >= cap || needs.image_bytes > cap - resident) return false;
-  const uint64_t left = cap - resident;
-
+  if (resident >= cap) return false;
   // Shares that follow the cap alone; how many threads there are only says how much of a share is used.
+  const uint64_t threads_share = std::max(kThreadBytes, (cap - resident) / 16);
+  if (threads_share >= cap - resident || needs.image_bytes > cap - resident - kThreadBytes) return false;
+  const uint64_t left = cap - resident - threads_share;
+  plan.threads =
+      static_cast<unsigned>(std::clamp<uint64_t>(threads_share / kThreadBytes, 1, std::max(1u, needs.threads)));
+  plan.threads_bytes = plan.threads * kThreadBytes;
   const uint64_t page = page_in_flight_bytes(needs.treelet_bytes, largest.layout);
   const uint64_t pages_share = std::max(2 * page, left / 8);
   const uint64_t lane = ObjectSource::lane_bytes(largest.layout);
   const uint64_t lanes_share = std::max(lane, left / 4);
   if (pages_share + largest.least_bytes > left || lanes_share > left) return false;
-  plan.threads = static_cast<unsigned>(
-      std::clamp<uint64_t>(left / 16 / kThreadBytes, 1, std::max(1u, needs.threads)));
   plan.pages_in_flight = static_cast<uint32_t>(std::min<uint64_t>(pages_share / page, 2 * plan.threads));
   plan.pages_bytes = plan.pages_in_flight * page;
   plan.lanes = static_cast<uint32_t>(std::min<uint64_t>(lanes_share / lane, plan.threads + 1));
   plan.reading_bytes = plan.lanes * lane;
   plan.chunk_bytes = std::min(left - pages_share, largest.object_bytes);
-  if (plan.chunk_bytes >= largest.object_bytes) return true;
+  if (plan.chunk_bytes >= largest.object_bytes && largest.object_triangles <= kMaxChunkTriangles) return true;
 
   // Some object goes through chunks: the grid, and the buffers while they are sorted.
   const uint64_t cells = cells_for(largest.object_triangles);
@@ -122,12 +126,12 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
 }  // namespace
 
 uint64_t BuildMemoryPlan::image_bytes() const {
-  return cap_bytes - process_bytes - document_bytes - tables_bytes - coverage_bytes - writing_bytes;
+  return cap_bytes - process_bytes - kThreadBytes - document_bytes - tables_bytes - coverage_bytes - writing_bytes;
 }
 
 uint64_t BuildMemoryPlan::chunk_triangles(const CornerLayout& layout) const {
   if (forced_chunk_triangles > 0) return forced_chunk_triangles;
-  return std::max<uint64_t>(1, chunk_bytes / built_bytes(1, layout));
+  return std::clamp<uint64_t>(chunk_bytes / built_bytes(1, layout), 1, kMaxChunkTriangles);
 }
 
 uint32_t BuildMemoryPlan::grid_cells(uint64_t triangles) const { return cells_for(triangles); }

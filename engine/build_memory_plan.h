@@ -40,6 +40,7 @@ struct BuildMemoryPlan {
   uint32_t lanes = 0;
   uint64_t buffers_bytes = 0;        ///< grid, then write buffers of the chunks, beside the lanes
   unsigned threads = 1;
+  uint64_t threads_bytes = 0;        ///< stacks, and staging of reads that are not aligned
   uint64_t forced_chunk_triangles = 0;
 
   /// What is left for an image while it is tiled.

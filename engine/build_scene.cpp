@@ -49,6 +49,14 @@ class SceneBuilder {
     note(geometry_.warnings);
     note(materials_.warnings);
     SHOAL_RETURN_IF_ERROR(plan_memory(files));
+    tbb::task_arena planned_threads(static_cast<int>(memory_.threads));
+    SHOAL_RETURN_IF_ERROR(planned_threads.execute([&] { return build(files, output); }));
+    report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return std::move(report_);
+  }
+
+ private:
+  Status build(gltf::BufferFiles& files, const std::string& output) {
     if (options_.consume) {
       SHOAL_ASSIGN_OR_RETURN(consumer_,
                              SourceConsumer::plan(fs_, document_, geometry_, output, report_.warnings));
@@ -66,11 +74,9 @@ class SceneBuilder {
     report_.file_bytes = writer.bytes_written();
     report_.consumed_bytes = consumed_bytes();
     progress("writing", 1);
-    report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return std::move(report_);
+    return {};
   }
 
- private:
   void progress(const char* stage, double fraction) const {
     if (options_.progress) options_.progress({stage, fraction});
   }
@@ -100,7 +106,7 @@ class SceneBuilder {
   /// Shares the cap out, before anything of size is read.
   Status plan_memory(gltf::BufferFiles& files) {
     BuildMemoryNeeds needs;
-    SHOAL_ASSIGN_OR_RETURN(const ImageNeeds images, measure_images(fs_, files, document_, materials_.textures));
+    SHOAL_ASSIGN_OR_RETURN(const ImageNeeds images, measure_images(fs_, files, document_, materials_.textures, options_.limits.image_pixels));
     needs.image_bytes = images.largest_bytes;
     needs.coverage_bytes = images.coverage_bytes;
     needs.document_bytes = document_bytes_;
@@ -312,7 +318,9 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
       auto result = builder.run(output);
       return result.ok() ? std::move(result) : explain(builder, result.error());
     } catch (const std::bad_alloc&) {
-      return Error{ErrorCode::kMemoryCap, fmt::format("{}: the build ran out of memory", gltf_path)};
+      return explain(builder, {ErrorCode::kMemoryCap, fmt::format("{}: the build ran out of memory", gltf_path)});
+    } catch (const std::system_error& error) {  // no more threads
+      return explain(builder, {ErrorCode::kMemoryCap, fmt::format("{}: {}", gltf_path, error.what())});
     }
   };
   if (options.treelet_bytes < kMinTreeletBytes || options.treelet_bytes > kMaxTreeletBytes) {

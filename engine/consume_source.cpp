@@ -25,11 +25,18 @@ std::set<uint32_t> buffers_of(const gltf::Document& document, const gltf::Primit
   return buffers;
 }
 
+/// One name for a file, whatever it is called: `a.bin`, `./a.bin` and a link to it are the same part.
+std::string file_name_of(const std::string& path) {
+  std::error_code code;
+  const stdfs::path canonical = stdfs::weakly_canonical(path, code);
+  return code ? path : canonical.string();
+}
+
 /// Why the part must stay; nothing when it may go. Links lead elsewhere, and a second name is somebody else's.
 std::string reason_to_keep(const std::string& path, const gltf::Document& document, const std::string& output) {
   std::error_code code;
   for (const gltf::Image& image : document.images) {
-    if (image.path == path) return "an image lies in it";
+    if (!image.path.empty() && file_name_of(image.path) == file_name_of(path)) return "an image lies in it";
   }
   if (stdfs::equivalent(path, output, code)) return "it is the output";
   if (stdfs::is_symlink(path, code)) return "it is a link";
@@ -40,6 +47,13 @@ std::string reason_to_keep(const std::string& path, const gltf::Document& docume
   return {};
 }
 
+/// A part by all its names, and who reads it last.
+struct NamedPart {
+  std::set<std::string> names;
+  std::pair<uint32_t, uint32_t> last_user;  // mesh and primitive
+  uint64_t bytes = 0;
+};
+
 }  // namespace
 
 Result<SourceConsumer> SourceConsumer::plan(FileSystem& fs, const gltf::Document& document,
@@ -47,7 +61,7 @@ Result<SourceConsumer> SourceConsumer::plan(FileSystem& fs, const gltf::Document
                                             std::vector<std::string>& warnings) {
   SourceConsumer consumer;
   consumer.fs_ = &fs;
-  std::map<std::string, std::pair<uint32_t, uint32_t>> last_user;
+  std::map<std::string, NamedPart> parts;
   for (const ObjectPlan& object : geometry.objects) {
     for (const uint32_t mesh : object.meshes) {
       for (const PrimitiveSource& source : geometry.meshes[mesh].primitives) {
@@ -58,18 +72,23 @@ Result<SourceConsumer> SourceConsumer::plan(FileSystem& fs, const gltf::Document
                                                         "a .glb lie in the file itself", document.path)};
           }
           if (buffer.path.empty()) continue;
-          last_user[buffer.path] = {mesh, source.primitive};
-          uint64_t& bytes = consumer.bytes_of_[buffer.path];
-          bytes = std::max(bytes, buffer.path_offset + buffer.byte_length);
+          NamedPart& part = parts[file_name_of(buffer.path)];
+          part.names.insert(buffer.path);
+          part.last_user = {mesh, source.primitive};
+          part.bytes = std::max(part.bytes, buffer.path_offset + buffer.byte_length);
         }
       }
     }
   }
-  for (const auto& [path, user] : last_user) {
-    if (const std::string reason = reason_to_keep(path, document, output); !reason.empty()) {
-      warnings.push_back(fmt::format("{} is not consumed: {}", path, reason));
+  for (const auto& [path, part] : parts) {
+    std::string reason = reason_to_keep(path, document, output);
+    for (const std::string& name : part.names) {
+      if (reason.empty()) reason = reason_to_keep(name, document, output);
+    }
+    if (!reason.empty()) {
+      warnings.push_back(fmt::format("{} is not consumed: {}", *part.names.begin(), reason));
     } else {
-      consumer.parts_of_[user].push_back(path);
+      consumer.parts_of_[part.last_user].push_back({path, part.bytes});
     }
   }
   return consumer;
@@ -78,9 +97,9 @@ Result<SourceConsumer> SourceConsumer::plan(FileSystem& fs, const gltf::Document
 Status SourceConsumer::source_done(const PrimitiveSource& source) {
   const auto found = parts_of_.find({source.mesh, source.primitive});
   if (found == parts_of_.end()) return {};
-  for (const std::string& path : found->second) {
-    SHOAL_ASSIGN_OR_RETURN(const uint64_t bytes, fs_->release(path, 0, bytes_of_[path]));
-    released_bytes_ += bytes;
+  for (const auto& [path, bytes] : found->second) {
+    SHOAL_ASSIGN_OR_RETURN(const uint64_t released, fs_->release(path, 0, bytes));
+    released_bytes_ += released;
   }
   return {};
 }

@@ -14,7 +14,8 @@ namespace shoal {
 
 class SourceConsumer {
  public:
-  /// Plans what goes when. Parts outside the scene's folder, behind a link, with a second name, or that are images or
+  /// Plans what goes when. Parts outside the scene's folder, behind a link, with a second
+  /// name, or that are images or
   /// the output stay, with a warning. Fails with: kUsage (a .glb, whose parts lie in the file itself).
   static Result<SourceConsumer> plan(FileSystem& fs, const gltf::Document& document, const GeometryPlan& geometry,
                                      const std::string& output, std::vector<std::string>& warnings);
@@ -24,8 +25,11 @@ class SourceConsumer {
 
  private:
   FileSystem* fs_ = nullptr;
-  std::map<std::pair<uint32_t, uint32_t>, std::vector<std::string>> parts_of_;  // by mesh and primitive, the last user
-  std::map<std::string, uint64_t> bytes_of_;
+  struct Part {
+    std::string path;
+    uint64_t bytes = 0;
+  };
+  std::map<std::pair<uint32_t, uint32_t>, std::vector<Part>> parts_of_;  // by mesh and primitive, the last user
   uint64_t released_bytes_ = 0;
 };
 

@@ -72,7 +72,7 @@ ImageHeader read_image_header(std::span<const std::byte> bytes) {
 }
 
 Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
-                          const std::vector<TextureRequest>& requests) {
+                                  const std::vector<TextureRequest>& requests, uint64_t most_pixels) {
   ImageNeeds needs;
   for (size_t r = 0; r < requests.size(); ++r) {
     const auto head = read_head(fs, files, document, document.images[requests[r].image]);
@@ -80,6 +80,7 @@ Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, cons
     if (!head.ok()) continue;  // reading the texture says what is wrong with it
     const ImageHeader header = read_image_header(head.value().bytes);
     const uint64_t pixels = uint64_t{header.width} * header.height;
+    if (pixels > most_pixels) continue;  // refused when it is read
     // The encoded bytes are there twice while a file is read.
     needs.largest_bytes =
         std::max(needs.largest_bytes, pixels * kImageScratchBytesPerPixel + 2 * head.value().encoded_bytes);

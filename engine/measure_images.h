@@ -16,9 +16,9 @@ struct ImageNeeds {
 };
 
 /// Images that cannot be read or whose header is not understood count for nothing here: engine/tile_textures refuses
-/// them, or those above the pixels that the plan leaves. Fails with: kStorage.
+/// them, or those above `most_pixels` or above the pixels that the plan leaves. Fails with: kStorage.
 Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
-                          const std::vector<TextureRequest>& requests);
+                                  const std::vector<TextureRequest>& requests, uint64_t most_pixels);
 
 struct ImageHeader {
   uint32_t width = 0, height = 0;

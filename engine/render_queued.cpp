@@ -29,7 +29,10 @@ class QueuedWorker {
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.samples.count()) {
-      while (room_for(admit_batch_)) admit(admit_batch_);
+      while (room_for(admit_batch_)) {
+        admit(admit_batch_);
+        worker_.report_progress();  // paths that see nothing end at once, and leave room for more
+      }
       const TreeletId treelet = scheduler_.choose(room_for(admit_batch_), worker_.cache_counters());
       if (treelet != kNoIndex) {
         drain(treelet);
@@ -168,6 +171,7 @@ void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler&
     try {
       std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run();
     } catch (const std::bad_alloc&) {  // the other threads would wait for this one's rays for ever
+      context.ended = true;
       context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
     }
   });

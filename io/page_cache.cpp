@@ -1,6 +1,7 @@
 #include "io/page_cache.h"
 
 #include <algorithm>
+#include <new>
 
 #include "io/mapped_pages.h"
 #include "io/page_cache_state.h"
@@ -72,7 +73,7 @@ Status PageCache::State::load(PageId page, PageLoad& load, std::unique_lock<std:
   return status;
 }
 
-Status PageCache::State::read(PageId page, std::byte* data, CacheCounters& counters) const {
+Status PageCache::State::read(PageId page, std::byte* data, CacheCounters& counters) const try {
   const PageRecord& record = file.record(page);
   const std::span<std::byte> bytes(data, record.raw_bytes);
   uint64_t read_bytes = 0;
@@ -81,10 +82,12 @@ Status PageCache::State::read(PageId page, std::byte* data, CacheCounters& count
   counters.disk_read_bytes += read_bytes;
   if (!status.ok()) return status;
   return check_read(page, data, counters);
+} catch (const std::bad_alloc&) {
+  return Error{ErrorCode::kMemoryCap, "out of memory"};
 }
 
 /// Counts a page that has been read and decoded, and looks it over.
-Status PageCache::State::check_read(PageId page, std::byte* data, CacheCounters& counters) const {
+Status PageCache::State::check_read(PageId page, std::byte* data, CacheCounters& counters) const try {
   const PageRecord& record = file.record(page);
   PageBuffers::zero_tail(data, record.raw_bytes);
   counters.decoded_bytes += record.raw_bytes;
@@ -97,6 +100,8 @@ Status PageCache::State::check_read(PageId page, std::byte* data, CacheCounters&
   SHOAL_RETURN_IF_ERROR(check(record, {data, record.raw_bytes}));
   slots[page].checked.store(true, std::memory_order_relaxed);
   return {};
+} catch (const std::bad_alloc&) {  // others wait for this page: they are told
+  return Error{ErrorCode::kMemoryCap, "out of memory"};  // short: allocates nothing
 }
 
 void PageCache::State::publish(PageId page, std::byte* data, uint32_t pins) {

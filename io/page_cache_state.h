@@ -52,6 +52,7 @@ struct PageCache::State {
         waiting(std::move(waiting_work)),
         eviction(make_eviction_policy(waiting ? eviction_name : "least-recent")),
         slots(std::make_unique<PageSlot[]>(page_file.page_count())) {
+    residents.reserve(page_file.page_count());
     for (PageId page = 0; page < page_file.page_count(); ++page)
       slots[page].bytes = page_file.record(page).raw_bytes;
   }

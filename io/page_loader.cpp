@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -71,9 +72,11 @@ struct PageLoader::State {
     }
   }
 
-  Status decode(const Status& read, PageId page, std::span<const std::byte> stored, std::byte* out) const {
+  Status decode(const Status& read, PageId page, std::span<const std::byte> stored, std::byte* out) const try {
     if (!read.ok()) return read;
     return file.decode_page(page, stored, {out, file.record(page).raw_bytes});
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kMemoryCap, "out of memory"};  // short: allocates nothing
   }
 
   const PageFile& file;

@@ -2,9 +2,11 @@
 // read ahead that fails harms nothing, or ends the render likewise.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstring>
 
 #include "engine/build_scene.h"
+#include "engine/camera.h"
 #include "engine/render.h"
 #include "io/page_cache.h"
 #include "tests/engine/bad_luck_scene.h"
@@ -18,12 +20,15 @@ struct Way {
   Order order;
   unsigned threads;
   uint32_t read_depth;  ///< 0: every page is read when it is needed, so that no failed read may go unnoticed
+  bool preview = false;  ///< other samples are held back until those of its first lattice have ended
 };
 
 const Way kWays[] = {{"depth-first", Order::kDepthFirst, 1, 0},
                      {"depth-first, two threads", Order::kDepthFirst, 2, 0},
                      {"queued", Order::kQueued, 1, 0},
-                     {"queued, reading ahead", Order::kQueued, 2, 8}};
+                     {"queued, reading ahead", Order::kQueued, 2, 8},
+                     {"depth-first, two threads, with a preview", Order::kDepthFirst, 2, 0, true},
+                     {"queued, reading ahead, with a preview", Order::kQueued, 2, 8, true}};
 
 class BadLuckRender : public ::testing::Test {
  protected:
@@ -39,7 +44,7 @@ class BadLuckRender : public ::testing::Test {
     SHOAL_ASSIGN_OR_RETURN(const Scene scene, open_scene(fs_, "scene.shoal", ReadMode::kDirect, {}));
     PictureOptions picture;
     picture.width = picture.height = 8;
-    picture.samples = 1;
+    picture.samples = way.preview ? 2 : 1;
     picture.shading.environment.kind = EnvironmentOptions::Kind::kConstant;
     ExecutionOptions execution;
     execution.order = way.order;
@@ -48,7 +53,9 @@ class BadLuckRender : public ::testing::Test {
     execution.paging.read_depth = way.read_depth;
     execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.file, way.threads);
     opening_calls_ = fs_.calls();
-    return render(fs_, scene, picture, execution);
+    if (way.preview) execution.preview.path = "preview.png";
+    MemoryFileSystem previews;
+    return render(previews, scene, picture, execution);
   }
 
   /// Harms every read of the render in turn, but for those of opening the scene, until none is left.
@@ -113,6 +120,29 @@ TEST_F(BadLuckRender, ADiskThatFailsForGoodEndsEveryWay) {
       ASSERT_FALSE(result.ok()) << way.name << " from read " << call;
       EXPECT_EQ(result.error().code, ErrorCode::kStorage);
     }
+  }
+}
+
+TEST_F(BadLuckRender, AStopIsHeardWhereCameraRaysSeeNothing) {
+  Result<Scene> scene = open_scene(memory_, "scene.shoal", ReadMode::kDirect, {});
+  ASSERT_TRUE(scene.ok());
+  CameraRecord camera = frame_camera(scene.value().top_tree.bounds());
+  camera.camera_to_world.translation = camera.camera_to_world.translation + Vec3{1e6f, 0, 0};
+  scene.value().cameras = {camera};
+  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+    PictureOptions picture;
+    picture.width = picture.height = 256;
+    picture.samples = 1u << 16;  // minutes, were it not stopped
+    ExecutionOptions execution;
+    execution.order = order;
+    execution.max_memory_bytes = 256ull << 20;
+    std::atomic<bool> stop = false;
+    RenderHooks hooks;
+    hooks.stop = &stop;
+    hooks.progress = [&](const RenderProgress&) { stop = true; };
+    const auto result = render(memory_, scene.value(), picture, execution, hooks);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::kStopped);
   }
 }
 

@@ -8,6 +8,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
 
 #include "engine/generate.h"
 #include "engine/render.h"
@@ -253,6 +256,63 @@ TEST(BuildChunks, ConsumeThePartsOfTheSourceAndNothingElse) {
   EXPECT_EQ(std::filesystem::file_size(part), size);
   if (consumed.report.consumed_bytes == 0) GTEST_SKIP() << "this file system has no holes";
   EXPECT_GE(consumed.report.consumed_bytes, size - 4096);
+}
+
+/// The glTF with everything twice: the second time its part goes by another name.
+void show_part_by_second_name(const std::string& gltf, const std::string& name) {
+  std::ifstream in(gltf);
+  auto json = nlohmann::json::parse(in);
+  in.close();
+  const size_t buffers = json["buffers"].size(), views = json["bufferViews"].size();
+  const size_t accessors = json["accessors"].size(), meshes = json["meshes"].size(), nodes = json["nodes"].size();
+  const auto twice = [&](const char* array, const std::function<void(nlohmann::json&)>& change) {
+    const size_t count = json[array].size();
+    for (size_t i = 0; i < count; ++i) {
+      nlohmann::json copy = json[array][i];
+      change(copy);
+      json[array].push_back(std::move(copy));
+    }
+  };
+  twice("buffers", [&](auto& buffer) { buffer["uri"] = name + buffer["uri"].template get<std::string>(); });
+  twice("bufferViews", [&](auto& view) { view["buffer"] = view["buffer"].template get<size_t>() + buffers; });
+  twice("accessors", [&](auto& a) { a["bufferView"] = a["bufferView"].template get<size_t>() + views; });
+  twice("meshes", [&](auto& mesh) {
+    for (auto& primitive : mesh["primitives"]) {
+      for (auto& accessor : primitive["attributes"]) accessor = accessor.template get<size_t>() + accessors;
+      if (primitive.contains("indices")) primitive["indices"] = primitive["indices"].template get<size_t>() + accessors;
+    }
+  });
+  twice("nodes", [&](auto& node) {
+    if (node.contains("mesh")) node["mesh"] = node["mesh"].template get<size_t>() + meshes;
+    if (node.contains("children")) node.erase("children");
+  });
+  for (size_t i = 0; i < nodes; ++i) json["scenes"][0]["nodes"].push_back(nodes + i);
+  std::ofstream(gltf) << json.dump();
+}
+
+void consume_part_of_two_names(const std::string& name, SceneBuildOptions options) {
+  const TemporaryFolder folder;
+  GenerateOptions terrain;
+  terrain.kind = "terrain";
+  terrain.triangles = 30000;
+  terrain.out_dir = folder / "terrain";
+  const auto generated = generate_scene(posix_file_system(), terrain);
+  ASSERT_TRUE(generated.ok()) << generated.error().message;
+  const std::string gltf = generated.value().gltf_path;
+  std::filesystem::create_directory_symlink(".", folder / "terrain/link");
+  show_part_by_second_name(gltf, name);
+  const BuiltScene whole = build_and_open(posix_file_system(), {}, gltf, folder / "whole.shoal");
+  options.consume = true;
+  const BuiltScene consumed = build_and_open(posix_file_system(), options, gltf, folder / "consumed.shoal");
+  EXPECT_GT(whole.report.triangles_count, 2 * 29000u);
+  expect_same_triangles(whole, consumed);
+}
+
+TEST(BuildChunks, ConsumeAPartOfTwoNamesOnlyWhenItIsReadByBoth) {
+  for (const char* name : {"./", "link/"}) {
+    consume_part_of_two_names(name, {});
+    consume_part_of_two_names(name, in_chunks_of(9000));
+  }
 }
 
 TEST(BuildChunks, RefuseToConsumeAGlb) {

@@ -30,7 +30,7 @@ uint64_t smallest_mib(const BuildMemoryNeeds& needs) {
 }
 
 void expect_within_cap(const BuildMemoryPlan& plan) {
-  const uint64_t resident = plan.process_bytes + plan.document_bytes + plan.tables_bytes + plan.coverage_bytes +
+  const uint64_t resident = plan.process_bytes + plan.threads_bytes + plan.document_bytes + plan.tables_bytes + plan.coverage_bytes +
                             plan.writing_bytes;
   EXPECT_LE(resident + plan.chunk_bytes + plan.pages_bytes, plan.cap_bytes);
   EXPECT_LE(resident + plan.reading_bytes + plan.buffers_bytes, plan.cap_bytes);
