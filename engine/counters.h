@@ -18,7 +18,7 @@ namespace shoal {
   X(samples_started_count, "samples", "camera paths begun")                                                   \
   X(samples_committed_count, "samples", "paths added to the film")                                            \
   X(page_requests_count, "pages", "pages asked of the page cache")                                            \
-  X(page_hits_count, "pages", "asked and resident")                                                           \
+  X(page_hits_count, "pages", "asked and resident, or being read by another thread already")                  \
   X(page_misses_count, "pages", "asked and read from disk")                                                   \
   X(page_prefetches_count, "pages", "read ahead from disk, before anyone asked")                              \
   X(page_evictions_count, "pages", "pages dropped to make room")                                              \
@@ -31,12 +31,13 @@ namespace shoal {
   X(texture_loads_count, "pages", "texture tiles read")                                                       \
   X(treelet_visits_count, "visits", "a ray crossing a treelet")                                               \
   X(treelet_batches_count, "batches", "a treelet taken in hand for the rays that wait for it")                \
-  X(treelet_visit_bytes, "bytes", "sizes of the treelets taken in hand, summed: bytes into the cache at most")   \
+  X(treelet_visit_bytes, "bytes", "sizes of the treelets taken in hand, summed: bytes into the cache at most") \
   X(paths_shaded_waiting_count, "paths", "vertices that waited for their treelet before shading")             \
   X(ray_moved_bytes, "bytes", "bytes of rays written to and read from queues")                                \
-  X(path_state_moved_bytes, "bytes", "bytes of path states touched at birth, shading and end")                \
+  X(path_state_moved_bytes, "bytes",                                                                          \
+    "bytes of path states touched: at birth, at the end of each ray, at shading and at the end")              \
   X(vertices_shaded_count, "vertices", "path vertices shaded")                                                \
-  X(texture_lookups_count, "lookups", "texture lookups")                                                      \
+  X(texture_lookups_count, "lookups", "texture look-ups")                                                     \
   X(coverage_tests_count, "tests", "alpha coverage tests in traversal")                                       \
   X(invalid_samples_count, "samples", "contributions that were not finite: dropped")                          \
   X(film_saturated_count, "samples", "contributions too large for the film: clamped")
