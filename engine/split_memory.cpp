@@ -26,7 +26,7 @@ uint64_t paths_within(const SplitInput& in, uint64_t least, uint64_t most, uint6
 }  // namespace
 
 uint64_t choose_paths_in_flight(const SplitInput& in) {
-  const uint64_t most = std::max(in.least_paths, in.samples);
+  const uint64_t most = std::max(in.least_paths, in.most_paths);
   const uint64_t useful = std::clamp(std::max(kUsefulPaths, kUsefulPathsATreelet * in.treelet_count),
                                      in.least_paths, most);
   const uint64_t useful_bytes = in.paths_bytes(useful);

@@ -11,6 +11,9 @@
 // which is least at b = S - M: paths take as much as is missing, but half of what is left at most. Beyond a half the
 // model promises more, but it knows nothing of treelets that most rays want, and those must find room
 // (docs/decisions/0012: what was measured).
+//
+// With room for all pages the paths are the useful ones only, max(2^19, 80 a treelet); else never fewer than that, unless
+// those take more than half.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +27,7 @@ struct SplitInput {
   uint64_t treelet_count = 0;
   uint64_t least_cache_bytes = 0;
   uint64_t least_paths = 0;
-  uint64_t samples = 0;           ///< of the whole picture: more paths than these never exist
+  uint64_t most_paths = 0;        ///< samples of the whole picture, at most kMaxPathsInFlight
   std::function<uint64_t(uint64_t paths)> paths_bytes;  ///< b; grows with `paths`
 };
 

@@ -11,13 +11,13 @@ namespace {
 constexpr uint64_t kMiB = 1ull << 20;
 constexpr uint64_t kPathBytes = 240;
 
-SplitInput input(uint64_t left_mib, uint64_t scene_mib, uint64_t samples) {
+SplitInput input(uint64_t left_mib, uint64_t scene_mib, uint64_t most_paths) {
   SplitInput in;
   in.left_bytes = left_mib * kMiB;
   in.scene_page_bytes = scene_mib * kMiB;
   in.least_cache_bytes = 2 * kMiB;
   in.least_paths = 512;
-  in.samples = samples;
+  in.most_paths = most_paths;
   in.paths_bytes = [](uint64_t paths) { return kMiB + paths * kPathBytes; };
   return in;
 }
@@ -25,13 +25,14 @@ SplitInput input(uint64_t left_mib, uint64_t scene_mib, uint64_t samples) {
 TEST(SplitMemory, StaysWithinWhatIsLeftAndAboveTheLeast) {
   for (uint64_t left = 4; left < 4000; left = left * 5 / 4 + 1) {
     for (const uint64_t scene : {1u, 10u, 100u, 1000u, 100000u}) {
-      for (const uint64_t samples : {1u, 600u, 100000u, 50000000u}) {
-        SplitInput in = input(left, scene, samples);
-        in.least_paths = std::min<uint64_t>(in.least_paths, samples);
+      for (const uint64_t most_paths : {1u, 600u, 100000u, 50000000u}) {
+        SplitInput in = input(left, scene, most_paths);
+        in.least_paths = std::min<uint64_t>(in.least_paths, most_paths);
         const uint64_t paths = choose_paths_in_flight(in);
         EXPECT_GE(paths, in.least_paths);
-        EXPECT_LE(paths, std::max(in.least_paths, samples));
-        EXPECT_LE(in.paths_bytes(paths) + in.least_cache_bytes, in.left_bytes) << left << " " << scene << " " << samples;
+        EXPECT_LE(paths, std::max(in.least_paths, most_paths));
+        EXPECT_LE(in.paths_bytes(paths) + in.least_cache_bytes, in.left_bytes)
+            << left << " " << scene << " " << most_paths;
       }
     }
   }
