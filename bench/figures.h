@@ -30,7 +30,7 @@ struct Rivals {
 /// Queued against depth-first and against depth-first over memory-mapped pages, all in the same memory.
 Figure figure_rivals(const Setup& setup, const Rivals& rivals);
 
-/// Bytes read over bytes of geometry, by share resident and rays in flight.
+/// Bytes read over bytes of all pages of the scene, by share in the cache and rays in flight.
 Figure figure_amplification(const Setup& setup, const std::vector<double>& shares, const std::vector<uint64_t>& rays);
 
 /// Time and bytes by how a cap is split between rays in flight and page cache: the split that is chosen beside `factors`

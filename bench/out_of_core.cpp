@@ -79,7 +79,7 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
   rivals->add_flag("!--no-mmap", a.rivals.mapped, "leave out the memory-mapped rival");
   rivals->callback([&] { figure = [&] { return figure_rivals(a.setup, a.rivals); }; });
 
-  CLI::App* amplification = declare_figure(app, a, "amplification", "bytes read over bytes of geometry");
+  CLI::App* amplification = declare_figure(app, a, "amplification", "bytes read over bytes of all pages of the scene");
   amplification->add_option("--shares", a.shares, "of the pages in the cache")->delimiter(',')->capture_default_str();
   amplification->add_option("--rays", a.rays, "in flight")->delimiter(',')->transform(kCounts)->capture_default_str();
   amplification->callback([&] { figure = [&] { return figure_amplification(a.setup, a.shares, a.rays); }; });

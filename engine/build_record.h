@@ -1,5 +1,6 @@
-// What a .shoal file says of its own making, and what a build depends on. No clock and no path of the machine: the
-// same source gives the same bytes. Called by engine/build_scene and engine/open_scene's readers.
+// What a .shoal file says of its own making, and what a build depends on. No clock and no path of the machine: the same
+// source, options and cap (which sets the chunks) give the same bytes. Called by engine/build_scene and
+// engine/open_scene's readers.
 #pragma once
 
 #include <string>

@@ -47,13 +47,13 @@ struct SceneBuildReport {
   std::vector<std::string> warnings;
 };
 
-/// Fails with: kInput, kUnsupported, kStorage, kMemoryCap, kStopped; nothing is left under `output` then. The same source and
-/// options give the same bytes, whatever the number of threads.
+/// Fails with: kInput, kUnsupported, kStorage, kMemoryCap, kStopped; nothing is left under `output` then. The same
+/// source, options and cap (which sets the chunks) give the same bytes, whatever the number of threads.
 Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_path, const std::string& output,
                                      const SceneBuildOptions& options);
 
-/// Hash of everything a build depends on: JSON, sizes and modification times of the files it names, options,
-/// version.
+/// What a built scene is kept under: a hash of the JSON, of sizes and modification times of the files it names, of
+/// treelet size and builder version; not of the cap, which changes the tree but never the picture.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

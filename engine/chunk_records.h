@@ -30,7 +30,7 @@ class MaterialLookup {
   std::vector<std::pair<uint32_t, uint32_t>> firsts_;  // first id, material; ascending
 };
 
-/// Appends a record for each triangle of the soup that is stored, to `records` (cleared); tags[i] is set for those.
+/// Writes the record of one triangle to `out`, record_bytes(layout) long.
 void encode_record(const TriangleSoup& soup, size_t triangle, std::byte* out);
 /// Appends `count` records to the soup. Parallel inside.
 void decode_records(std::span<const std::byte> records, const MaterialLookup& materials, TriangleSoup& soup);
@@ -42,7 +42,7 @@ struct ChunkExtent {
 
 class ChunkWriter {
  public:
-  /// Makes the file. `buffer_bytes`, a multiple of kPageAlignment, for each chunk. Fails with: kStorage, kMemoryCap.
+  /// Makes the file. `buffer_bytes`, a multiple of kBlockBytes, for each chunk. Fails with: kStorage, kMemoryCap.
   static Result<ChunkWriter> create(FileSystem& fs, const std::string& folder, std::span<const uint64_t> records,
                                     uint64_t bytes_a_record, uint64_t buffer_bytes);
   /// Fails with: kStorage; kInput when a chunk gets more records than it was made for.

@@ -43,7 +43,8 @@ struct ExecutionOptions {
   uint64_t max_memory_bytes = 0;    ///< of the whole process; 0: 70 % of the smaller of memory and cgroup limit
   uint64_t process_bytes = 0;       ///< of plan_before_tables(), so that every plan says the same; 0: measured
   uint64_t page_cache_bytes = 0;    ///< 0: from the plan
-  uint64_t rays_in_flight = 0;      ///< 0: from the plan; rounded up to one block
+  /// 0: from the plan. Two a path, at least one block (64), at most 2 kMaxPathsInFlight.
+  uint64_t rays_in_flight = 0;
   std::string policy = "resident-first";
   PolicyOptions policy_options;
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
@@ -54,7 +55,7 @@ struct ExecutionOptions {
 /// The first preview that was there to be looked at.
 struct FirstPicture {
   double seconds = 0;      ///< since the render began, until the file stood under its name
-  double pixel_share = 0;  ///< of the pixels, that had a sample of their own; the others showed a neighbour
+  double pixel_share = 0;  ///< share of the pixels that had a sample of their own; the others showed a neighbour
 };
 
 struct RenderProgress {
@@ -78,10 +79,10 @@ struct RenderResult {
   double seconds = 0;
   unsigned threads = 0;
   uint64_t peak_cache_bytes = 0;
-  double picture_share = 1;  ///< of the pixels, that were rendered (PictureOptions::tile_sample)
+  double picture_share = 1;  ///< share of the pixels that were rendered (PictureOptions::tile_sample)
   std::optional<FirstPicture> first_picture;  ///< none without a preview, or when none could be written
   uint32_t previews_count = 0;                ///< written while rendering
-  double preview_seconds = 0;                 ///< that one thread spent on them, or another
+  double preview_seconds = 0;                 ///< spent drawing and writing them, summed over threads
 };
 
 /// Sizes and samples that can be rendered. Fails with: kUsage.

@@ -1,6 +1,7 @@
 // The files that a scene is built from: watched while it is built, remembered in the .shoal (table kSourceFiles), and
 // looked at again before it is rendered. Sizes and a hash of the JSON are remembered, no clock and no absolute path:
-// the same source, lying the same way from the output, gives the same bytes. Called by engine/build_scene and bins.
+// the same source, lying the same way from the output, gives the same bytes with the same options and cap. Called by
+// engine/build_scene and bins.
 // Thread rule: one thread. Cost: opens each file; a check before a render reads the JSON as well.
 #pragma once
 

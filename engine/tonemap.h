@@ -1,4 +1,4 @@
-// From linear radiance to 8-bit sRGB for PNG previews: exposure, a tone curve, the sRGB encoding. Called by bins
+// From linear radiance to 8-bit sRGB for PNG: exposure, a tone curve, the sRGB encoding. Called by bins
 // and engine/preview. Plain functions, any thread; bits do not depend on the machine (engine/math.h). Cost: about 50 ns
 // a pixel.
 #pragma once

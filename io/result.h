@@ -17,10 +17,12 @@ enum class ErrorCode : uint8_t {
   kUsage = 2,        ///< options that do not fit together
   kInput = 3,        ///< input missing, malformed or over a budget
   kUnsupported = 4,  ///< a required glTF extension that we do not read
-  kMemoryCap = 5,    ///< the memory cap cannot work
+  kMemoryCap = 5,    ///< the memory cap cannot work, or memory ran out
   kStorage = 6,      ///< disk full or an I/O error
   kCorrupt = 7,      ///< a .shoal file whose bytes are not what was written
-  kStopped = 9,      ///< stopped by a signal; nothing was written
+  /// Stopped by a signal: no output file but the last preview is left; a source being --consumed is already destroyed
+  /// in part.
+  kStopped = 9,
 };
 
 struct Error {

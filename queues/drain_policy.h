@@ -21,12 +21,12 @@ struct WaitingTreelet {
 };
 
 struct PolicyOptions {
-  uint32_t queue_capacity = 4096;  ///< full: a queue is flushed when so many wait
+  uint32_t queue_capacity = 4096;  ///< full: a queue is flushed when so many rays and paths wait
   uint32_t minimum_batch = 64;     ///< resident-first: smaller queues wait while larger ones exist
   uint32_t drains = 32;            ///< treelets to drain of a decision, at most; at least 1
   uint32_t loads = 64;             ///< treelets to load of a decision, at most; 0: nothing can be read ahead
-  /// resident-first: while so many rays wait in memory nothing more is read ahead, so that more gather first. 0: from
-  /// the rays in flight (engine/render.cpp).
+  /// resident-first: while so many rays wait in memory nothing more is read ahead, so that more gather first. 0: a
+  /// quarter of the paths in flight, at least 16384 (scaled_policy, engine/treelet_scheduler.cpp).
   uint32_t rays_ahead = 0;
 };
 
