@@ -8,8 +8,9 @@
 namespace shoal {
 namespace {
 
-constexpr double kFirstInterval = 2, kLongestInterval = 30;
-/// Of the time of all threads, what drawing and writing may take after the first.
+/// Chosen: often while much changes, seldom later.
+constexpr double kFirstIntervalSeconds = 2, kLongestIntervalSeconds = 30;
+/// Of the time of all threads, what drawing and writing may take after the first: chosen.
 constexpr double kShareOfTime = 0.02;
 /// What libpng and zlib hold for themselves while they write.
 constexpr uint64_t kWriterBytes = 1u << 20;
@@ -25,7 +26,7 @@ Preview::Preview(FileSystem& fs, const PreviewOptions& options, const Film& film
       threads_(threads),
       start_seconds_(start_seconds),
       warning_(warning),
-      interval_seconds_(kFirstInterval),
+      interval_seconds_(kFirstIntervalSeconds),
       rgb_(size_t{film.width()} * film.height() * 3),
       known_(size_t{film.width()} * film.height()),
       row_x_(film.width()) {
@@ -64,7 +65,7 @@ void Preview::show() {
   const double end = now_seconds();
   seconds_ += end - start;
   due_seconds_ = end + std::max(interval_seconds_, (end - start) / (kShareOfTime * threads_));
-  interval_seconds_ = std::min(2 * interval_seconds_, kLongestInterval);
+  interval_seconds_ = std::min(2 * interval_seconds_, kLongestIntervalSeconds);
   if (!written.ok()) {
     if (!warned_ && warning_) warning_("the preview could not be written: " + written.error().message);
     warned_ = true;
@@ -72,7 +73,8 @@ void Preview::show() {
   }
   ++shown_count_;
   const std::lock_guard guard(first_mutex_);
-  if (!first_) first_ = FirstPicture{end - start_seconds_, static_cast<double>(known) / static_cast<double>(known_.size())};
+  if (first_) return;
+  first_ = FirstPicture{end - start_seconds_, static_cast<double>(known) / static_cast<double>(known_.size())};
 }
 
 uint64_t Preview::draw() {

@@ -3,11 +3,12 @@
 // the first lattice begins before that one is complete. Called by engine/render and engine/render_worker.
 //
 // Properties and assumptions
-//   content    a pixel with samples shows their mean; one without shows the nearest pixel of the finest lattice that has
-//              some there; black where there is none.
-//   when       as soon as the first lattice is complete, then after 2, 4, 8, 16 and every 30 s, but never more than
-//              kShareOfTime of what the threads have.
+//   content    a pixel with samples shows their mean; one without shows the nearest pixel of the finest lattice that
+//              has some there; black where there is none.
+//   when       as soon as the first lattice is complete, then after 2, 4, 8, 16 and every 30 s, but so seldom that
+//              drawing and writing take at most 2 % of the time of all threads.
 //   threads    any number; one of them draws and writes, the others pass by.
+//   cost       a picture shown: one thread, about 50 ns a pixel for the tone curve, and zlib; memory: bytes().
 //   failure    a preview that cannot be written is said once; the render goes on and later ones are tried. The file is
 //              the last one that was whole (io/file.h, AtomicFile).
 #pragma once
@@ -26,9 +27,11 @@ namespace shoal {
 
 class Preview {
  public:
-  /// `warning` may be empty. What is passed must outlive it.
+  /// `warning` may be empty. What is passed must outlive it. `start_seconds`: now_seconds() when the render began, from
+  /// which the time of the first picture counts.
   Preview(FileSystem& fs, const PreviewOptions& options, const Film& film, const SampleOrder& samples, unsigned threads,
           double start_seconds, const std::function<void(const std::string&)>& warning);
+  /// Memory it takes for a picture of this size, at most: its pixels, and the file before it is written.
   static uint64_t bytes(uint32_t width, uint32_t height);
 
   /// Shows what the film holds, when that is due and no other thread is at it.
@@ -37,7 +40,7 @@ class Preview {
   void show_if_none();
 
   std::optional<FirstPicture> first() const;
-  /// Of the end: pictures written, and seconds spent.
+  /// To be asked at the end. Pictures written, and seconds spent drawing and writing, summed over threads.
   uint32_t shown_count() const { return shown_count_; }
   double seconds() const { return seconds_; }
 

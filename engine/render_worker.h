@@ -51,7 +51,8 @@ struct RenderContext {
   bool may_begin() const { return next_sample.load(std::memory_order_relaxed) < begin_limit(); }
 
  private:
-  /// With a preview nothing else begins before the first lattice is complete: few rays would wait for ever where many do.
+  /// With a preview nothing else begins before the first lattice is complete. Else policies would drain the large
+  /// queues of later samples first, and the lattice's few rays would wait.
   uint64_t begin_limit() const {
     return samples_done >= samples.first_lattice_count() ? samples.count() : samples.first_lattice_count();
   }

@@ -2,9 +2,10 @@
 // a pixel after one another, so that the paths in flight are close together. The picture does not depend on it.
 //
 // Coarse first (for a preview): before all others come the first samples of a sparse lattice of pixels, then of the
-// lattices between, each half as wide as the one before (as in interlaced PNG), as many as were asked for. All else
-// comes in the order of tiles; where that meets a sample which is done, it takes one of those for which the first had
-// taken the place.
+// lattices between, each half as wide as the one before (as in interlaced PNG), as many as were asked for. Indices
+// below the lattices' count name lattice samples. Every later index names its sample in tile order; if a lattice took
+// that one, it names instead the sample displaced at that lattice index (repeated until free), so each sample occurs
+// once.
 //
 // With `tile_sample` N only one in N tiles is rendered: of every N tiles in that order the one that a fixed hash names,
 // so that they are spread over the picture and the same in every order. Called by engine/render_*. Immutable, any
