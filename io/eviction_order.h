@@ -1,5 +1,5 @@
-// Which resident pages go next. The page cache hands over all unpinned pages with their rank (io/eviction_policy.h); the order keeps
-// the lowest ones and gives them out one by one until they are used up, so that a ranking of n pages serves
+// Which resident pages go next. The page cache hands over all unpinned pages with their rank (io/eviction_policy.h); the
+// order keeps the lowest ones and gives them out one by one until they are used up, so that a ranking of n pages serves
 // many evictions.
 //
 // Properties and assumptions

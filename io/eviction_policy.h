@@ -12,12 +12,12 @@
 
 namespace shoal {
 
-/// What is known of the demand for a page, in units of work (rays and paths).
+/// The demand for a page, in units of work (rays and paths): what waits for it, and what usually does.
 struct PageDemand {
   PageDemand() = default;
-  PageDemand(uint64_t waiting_now, uint64_t usual = 0) : waiting(waiting_now), recent(usual) {}
+  PageDemand(uint64_t waiting_now, uint64_t usual_batch = 0) : waiting(waiting_now), usual(usual_batch) {}
   uint64_t waiting = 0;  ///< waits for it now
-  uint64_t recent = 0;   ///< what usually gathered before its last visits
+  uint64_t usual = 0;    ///< the usual batch: what gathered before its drains, as a rule; 0: not known
 };
 
 /// Called under the cache's lock when it evicts. Must not call back.
@@ -26,7 +26,8 @@ using WaitingWork = std::function<PageDemand(PageId)>;
 class EvictionPolicy {
  public:
   virtual ~EvictionPolicy() = default;
-  /// The page with the smallest rank goes first; equal ones by least recent use. `last_use` grows with every load.
+  /// The page with the smallest rank goes first; equal ones by least recent use. `last_use`: stamp of the last load or
+  /// pin, of a clock that each load moves on.
   virtual uint64_t rank(const PageDemand& demand, uint64_t last_use) const = 0;
   /// A page is read ahead into the room of this one only when more work than this waits for it.
   virtual uint64_t worth(const PageDemand& demand) const { return demand.waiting; }

@@ -10,7 +10,7 @@ class LeastDemand final : public EvictionPolicy {
   uint64_t rank(const PageDemand& demand, uint64_t /*last_use*/) const override {
     return worth(demand);
   }
-  uint64_t worth(const PageDemand& demand) const override { return demand.waiting + demand.recent; }
+  uint64_t worth(const PageDemand& demand) const override { return demand.waiting + demand.usual; }
 };
 
 }  // namespace

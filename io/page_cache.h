@@ -108,6 +108,7 @@ class PageCache {
   /// thread that waited for another's read of the page counts a hit. Requires: page < page_count() of the file.
   Result<PagePin> pin(PageId page, CacheCounters& counters);
   /// Starts reading a page that will be wanted. A read that fails is kept (failure()): who asked may never pin it.
+  /// With read_depth 0 or without WaitingWork the answer for a page that is not resident is always kBusy.
   Prefetch prefetch(PageId page, CacheCounters& counters);
   /// The same for a page and the one after it, with one read where both are wanted and lie side by side.
   Prefetch prefetch_pair(PageId page, CacheCounters& counters);
