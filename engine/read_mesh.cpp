@@ -251,7 +251,7 @@ void TriangleBlock::clear(CornerLayout layout, uint64_t expected) {
 uint64_t PrimitiveReader::memory_bytes(CornerLayout layout) {
   // For the indices, the positions and each attribute the accessor's blocks and a window; then the indices in hand.
   const uint64_t readers = 2ull + layout.normal + layout.tangent + layout.color + layout.uv_count;
-  return readers * gltf::kChunkBytes + 4 * kMaxWindowVertices * (3 + layout.floats()) + 3 * 4 * kChunkTriangles;
+  return readers * gltf::kReaderBytes + 4 * kMaxWindowVertices * (3 + layout.floats()) + 3 * 4 * kChunkTriangles;
 }
 
 CornerLayout layout_of(const gltf::Primitive& primitive, const MaterialPlan& plan) {

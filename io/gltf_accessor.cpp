@@ -106,7 +106,7 @@ Result<AccessorReader> AccessorReader::open(BufferFiles& files, const Document& 
   if (source.view && document.views[*source.view].byte_stride != 0) {
     reader.stride_ = document.views[*source.view].byte_stride;
   }
-  reader.block_elements_ = kBlockBytes / reader.stride_;
+  reader.block_elements_ = kReadBytes / reader.stride_;
   const uint64_t blocks = (reader.count_ + reader.block_elements_ - 1) / reader.block_elements_;
   reader.numbers_.resize(std::clamp<uint64_t>(blocks, 1, kBlockCount), kNoBlock);
   if (source.view) SHOAL_RETURN_IF_ERROR(files.check(document.views[*source.view].buffer));

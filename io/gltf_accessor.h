@@ -1,8 +1,8 @@
 // Accessors as streams of floats or indices, read in bounded chunks from the file: a buffer is never held whole nor
 // mapped. Handles every component type, stride, normalised integers, sparse values and missing views.
 // Called by engine/build_scene. Thread rule: a BufferFiles and its readers belong to one thread; a document may be
-// shared. Cost: one read of the blocks (kBlockBytes) that a call wants and are not at hand, one conversion a value;
-// at most kChunkBytes of memory a reader.
+// shared. Cost: one read of the blocks (kReadBytes) that a call wants and are not at hand, one conversion a value;
+// at most kReaderBytes of memory a reader.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,10 @@
 
 namespace shoal::gltf {
 
-inline constexpr uint64_t kChunkBytes = 1u << 20;
+/// What a reader keeps of a buffer, at most.
+inline constexpr uint64_t kReaderBytes = 1u << 20;
 /// What is read at once: small enough that vertices in no order at all do not read a megabyte each.
-inline constexpr uint64_t kBlockBytes = 64u << 10;
+inline constexpr uint64_t kReadBytes = 64u << 10;
 
 /// Open files of a document's buffers, opened on first use, at most `max_open_files` at once. Read directly: the
 /// system's cache counts against the memory of a control group.
@@ -42,7 +43,7 @@ class BufferFiles {
   uint64_t read_bytes_ = 0;
 };
 
-/// Random access over one accessor through a direct-mapped cache of blocks, together at most kChunkBytes: cheap
+/// Random access over one accessor through a direct-mapped cache of blocks, together at most kReaderBytes: cheap
 /// when the elements asked for lie within a megabyte, as they do in indexed meshes written by exporters; correct in
 /// any order. Sparse values replace those of a block when it is loaded.
 class AccessorReader {
@@ -60,7 +61,7 @@ class AccessorReader {
 
  private:
   static constexpr uint64_t kNoBlock = ~0ull;
-  static constexpr size_t kBlockCount = kChunkBytes / kBlockBytes;
+  static constexpr size_t kBlockCount = kReaderBytes / kReadBytes;
 
   AccessorReader() = default;
   uint64_t block_bytes() const { return block_elements_ * stride_; }
