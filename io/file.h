@@ -100,9 +100,12 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&&) noexcept;
   ~AtomicFile();
 
+  /// Adds `bytes` at the end. Fails with: kStorage, also for what was gathered before (kDirect).
   Status append(std::span<const std::byte> bytes);
+  /// Over what is there, or beyond the end: the gap reads as zero. Fails with: as append().
   Status write_at(uint64_t offset, std::span<const std::byte> bytes);
   uint64_t size_bytes() const { return size_bytes_; }
+  /// Once, at the end. Fails with: kStorage; without its new name the temporary goes with the destructor.
   Status commit();
 
  private:
