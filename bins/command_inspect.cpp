@@ -28,7 +28,7 @@ int run_info(const InspectArguments& arguments, Console& console) {
 }
 
 int run_verify(const InspectArguments& arguments, Console& console) {
-  const auto scene = open_scene(posix_file_system(), arguments.file, ReadMode::kBuffered, {});
+  const auto scene = open_scene(posix_file_system(), arguments.file, ReadMode::kDirect, {});
   if (!scene.ok()) return console.error(scene.error());
   const Status verified = verify_scene(scene.value());
   if (!verified.ok()) return console.error(verified.error());
