@@ -36,7 +36,7 @@ void Console::log(LogLevel line_level, std::string_view prefix, std::string_view
   std::lock_guard guard(mutex_);
   if (bar_open_) std::fputs("\n", stderr), bar_open_ = false;
   if (progress == ProgressMode::kJson) {
-    static constexpr const char* kLevelNames[] = {"error", "warning", "info", "debug"};
+    static constexpr const char* kLevelNames[] = {"error", "warning", "info"};
     print_json({{"level", kLevelNames[static_cast<size_t>(line_level)]},
                 {"message", message},
                 {"seconds", seconds_since_start()},

@@ -12,7 +12,7 @@
 
 namespace shoal {
 
-enum class LogLevel : uint8_t { kError, kWarning, kInfo, kDebug };
+enum class LogLevel : uint8_t { kError, kWarning, kInfo };
 enum class ProgressMode : uint8_t { kAuto, kBar, kLines, kJson, kNone };
 
 class Console {

@@ -18,8 +18,7 @@ namespace {
 void declare_console(CLI::App& app, shoal::Console& console, bool& quiet) {
   static const std::map<std::string, shoal::LogLevel> kLevels{{"error", shoal::LogLevel::kError},
                                                               {"warning", shoal::LogLevel::kWarning},
-                                                              {"info", shoal::LogLevel::kInfo},
-                                                              {"debug", shoal::LogLevel::kDebug}};
+                                                              {"info", shoal::LogLevel::kInfo}};
   static const std::map<std::string, shoal::ProgressMode> kModes{{"auto", shoal::ProgressMode::kAuto},
                                                                  {"bar", shoal::ProgressMode::kBar},
                                                                  {"lines", shoal::ProgressMode::kLines},
@@ -46,8 +45,8 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "shoal " SHOAL_VERSION);
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done, 1 a bug of ours, 2 usage, 3 input missing or invalid, 4 a required extension is not "
-             "supported,\n5 the memory cap cannot work, 6 disk full or I/O error, 7 a corrupt .shoal file, 9 stopped, "
-             "10 (diff) the pictures differ.");
+             "supported,\n5 the memory cap cannot work or memory ran out, 6 disk full or I/O error, 7 a corrupt .shoal "
+             "file, 9 stopped, 10 (diff) the pictures differ.");
   shoal::Console console;
   shoal::Command command;
   shoal::declare_build(app, console, command);

@@ -40,7 +40,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
     const ProgramRun run = run_shoal(folder, {command, "--help"});
     expect_exit(run, 0);
     EXPECT_EQ(run.err, "") << command;
-    for (const char* everywhere : {"--help", "--log-level", "--progress", "--quiet", "error, warning, info, debug",
+    for (const char* everywhere : {"--help", "--log-level", "--progress", "--quiet", "error, warning, info",
                                    "auto, bar, lines, json, none"}) {
       EXPECT_THAT(run.out, HasSubstr(everywhere)) << command;
     }
