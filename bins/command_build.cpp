@@ -63,7 +63,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("scene", arguments->scene, "a .gltf or .glb")->required();
   sub->add_option("-o,--output", arguments->output, "the .shoal to write")->required();
   sub->add_option("--treelet-size", arguments->treelet_size, "bytes of a treelet, 4K to 4M (default 256K)");
-  sub->add_option("--max-memory", arguments->max_memory, "cap on the whole process, such as 2G (default: 70 % of what there is)");
+  sub->add_option("--max-memory", arguments->max_memory, kMaxMemoryHelp);
   sub->add_option("--scratch", arguments->scratch_folder,
                   "folder for what does not fit in memory: 40 bytes a triangle and 12 for each float of a corner's "
                   "attributes (default: that of the output)");

@@ -100,7 +100,9 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("compare", "the same picture in several orders, and what each moved");
   arguments->render.declare(*sub);
-  sub->add_option("--orders", arguments->orders, "comma-separated")->delimiter(',')->capture_default_str();
+  sub->add_option("--orders", arguments->orders, "comma-separated: queued, depth-first")
+      ->delimiter(',')
+      ->capture_default_str();
   sub->add_option("--out", arguments->out, "folder for compare.json")->required();
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_compare(*arguments, console); };

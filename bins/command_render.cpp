@@ -91,9 +91,9 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   CLI::App* sub = app.add_subcommand("render", "scene to picture");
   arguments->render.declare(*sub);
   sub->add_option("-o,--output", arguments->output, "the picture, .exr")->required();
-  sub->add_option("--png", arguments->png, "the picture as 8-bit sRGB as well");
+  sub->add_option("--png", arguments->png, "the picture as 8-bit sRGB PNG as well");
   sub->add_option("--preview", arguments->preview,
-                  "the same, written early from few samples and refreshed while rendering; finished at the end");
+                  "a .png, written early from few samples, refreshed while rendering, finished at the end");
   sub->add_option("--tonemap", arguments->tonemap, "of --png and --preview: pbr-neutral, none")->capture_default_str();
   sub->add_option("--exposure", arguments->exposure, "of --png and --preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");

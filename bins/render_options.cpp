@@ -174,11 +174,12 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--camera", picture.camera, "index among the scene's cameras")->capture_default_str();
   app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
   app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
-  app.add_option("--max-memory", max_memory, "cap on the whole process, such as 2G (default: 70 % of what there is)");
+  app.add_option("--max-memory", max_memory, kMaxMemoryHelp);
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")
       ->capture_default_str()
       ->group("For experiments");
-  app.add_option("--queue-capacity", execution.policy_options.queue_capacity, "policy full: rays that fill a queue")
+  app.add_option("--queue-capacity", execution.policy_options.queue_capacity,
+                 "policy full: rays and paths that fill a queue")
       ->capture_default_str()
       ->group("For experiments");
   static const std::map<std::string, ReadBackend> kBackends{
@@ -192,7 +193,8 @@ void RenderArguments::declare(CLI::App& app) {
       ->check(CLI::Range(0, 1024))
       ->group("For experiments");
   app.add_option("--rays-ahead", execution.policy_options.rays_ahead,
-                 "policy resident-first: reads ahead once fewer rays wait in memory (default: from the plan)")
+                 "policy resident-first: reads ahead once fewer rays wait in memory (default: a quarter of the paths "
+                 "in flight, at least 16384)")
       ->group("For experiments");
   add_choice(app, "--read-backend", execution.paging.backend, kBackends, ": how pages are read ahead")
       ->type_name("WAY")
@@ -201,7 +203,8 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--page-cache", page_cache, "bytes of decoded pages kept (default: from the plan)")
       ->group("For experiments");
-  app.add_option("--rays-in-flight", execution.rays_in_flight, "rays that may wait at once (default: from the plan)")
+  app.add_option("--rays-in-flight", execution.rays_in_flight,
+                 "rays that may wait at once, two a path, at least 64 (default: from the plan)")
       ->group("For experiments");
   app.add_option("--tile-sample", picture.tile_sample,
                  "render one in so many tiles of 32 x 32 pixels, spread over the picture; figures are of those tiles")
@@ -216,7 +219,8 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_flag("--allow-stale", allow_stale, "render a .shoal even if its source changed since it was built");
   app.add_option("--scratch", scratch_folder, "folder for what does not fit in memory when a glTF is built (default: "
                                               "that of the built scene)");
-  app.add_option("--cache-dir", cache_folder, "where built scenes are kept (default: ~/.cache/shoal)");
+  app.add_option("--cache-dir", cache_folder,
+                 "where built scenes are kept (default: $XDG_CACHE_HOME/shoal, else ~/.cache/shoal)");
 }
 
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,

@@ -26,6 +26,10 @@ Result<EnvironmentOptions> parse_environment(const std::string& text);
 /// rename would take the place of a device or a pipe as well). Asked before long work. Fails with: kStorage.
 Status check_output(const std::string& path);
 
+/// The help of --max-memory, which `build` has as well.
+inline constexpr const char* kMaxMemoryHelp =
+    "cap on the whole process, such as 2G (default: 70 % of the smaller of physical memory and control-group limits)";
+
 /// Options as they stand on the command line.
 struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder;
