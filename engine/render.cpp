@@ -47,6 +47,39 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
+/// What waits for each page, for eviction and reads ahead. Requires: what is passed outlives it.
+WaitingWork make_waiting_work(const QueuedPaths& paths, const UsualBatches& batches,
+                              std::span<const TreeletId> page_treelets) {
+  return [&paths, &batches, page_treelets](PageId page) {
+    const TreeletId treelet = page_treelets[page];
+    return treelet == kNoIndex ? PageDemand(kTextureTileWork, kTextureTileDemand)
+                               : PageDemand(paths.waiting(treelet), batches.of(treelet));
+  };
+}
+
+/// What a complete render leaves. Ends the preview, whose memory goes before that of the floats is taken.
+RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::optional<Preview>& preview) {
+  const PictureOptions& picture = context.picture;
+  RenderResult result;
+  if (preview) {
+    preview->show_if_none();
+    result.first_picture = preview->first();
+    result.previews_count = preview->shown_count();
+    result.preview_seconds = preview->seconds();
+    context.preview = nullptr;
+    preview.reset();
+  }
+  result.rgba = context.film.resolve(picture.samples);
+  result.counters = context.counters;
+  result.plan = plan;
+  result.threads = context.threads;
+  result.picture_share =
+      static_cast<double>(context.samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
+  result.peak_cache_bytes = context.cache.peak_resident_bytes();
+  result.seconds = now_seconds() - context.start_seconds;
+  return result;
+}
+
 }  // namespace
 
 Status check_picture(const PictureOptions& picture) {
@@ -91,10 +124,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   if (queued) {
     paths = std::make_unique<QueuedPaths>(static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight,
                                           execution.threads);
-    waiting = [&](PageId page) -> PageDemand {
-      const TreeletId treelet = page_treelets[page];
-      return treelet == kNoIndex ? PageDemand(kTextureTileWork, kTextureTileDemand) : PageDemand(paths->waiting(treelet), batches.of(treelet));
-    };
+    waiting = make_waiting_work(*paths, batches, page_treelets);
   }
   PageCache cache(*scene.file, plan.cache_bytes,
                   [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
@@ -118,24 +148,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
-
-  RenderResult result;
-  if (preview) {
-    preview->show_if_none();
-    result.first_picture = preview->first();
-    result.previews_count = preview->shown_count();
-    result.preview_seconds = preview->seconds();
-    preview.reset();
-  }
-  result.rgba = film.resolve(picture.samples);
-  result.counters = context.counters;
-  result.plan = plan;
-  result.threads = execution.threads;
-  result.picture_share =
-      static_cast<double>(samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
-  result.peak_cache_bytes = cache.peak_resident_bytes();
-  result.seconds = now_seconds() - start;
-  return result;
+  return finish_result(context, plan, preview);
 }
 
 }  // namespace shoal
