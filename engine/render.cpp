@@ -76,6 +76,7 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
   result.picture_share =
       static_cast<double>(context.samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
   result.peak_cache_bytes = context.cache.peak_resident_bytes();
+  result.read_backend = context.cache.read_backend();
   result.seconds = now_seconds() - context.start_seconds;
   return result;
 }

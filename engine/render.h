@@ -79,6 +79,7 @@ struct RenderResult {
   double seconds = 0;
   unsigned threads = 0;
   uint64_t peak_cache_bytes = 0;
+  std::string read_backend;  ///< PageCache::read_backend()
   double picture_share = 1;  ///< share of the pixels that were rendered (PictureOptions::tile_sample)
   std::optional<FirstPicture> first_picture;  ///< none without a preview, or when none could be written
   uint32_t previews_count = 0;                ///< written while rendering

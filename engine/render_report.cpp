@@ -86,7 +86,16 @@ Json plan_json(const MemoryPlan& plan) {
           {"texture_page_bytes", plan.texture_page_bytes}};
 }
 
-Json options_json(const PictureOptions& picture, const ExecutionOptions& execution) {
+/// As --environment takes it.
+std::string environment_text(const EnvironmentOptions& environment) {
+  if (environment.kind == EnvironmentOptions::Kind::kNone) return "none";
+  if (environment.kind == EnvironmentOptions::Kind::kImage) return environment.path;
+  const Vec3& radiance = environment.radiance;
+  return fmt::format("constant:{},{},{}", radiance.x, radiance.y, radiance.z);
+}
+
+Json options_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
+                  const ExecutionOptions& execution) {
   return {{"width", picture.width},
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
@@ -94,9 +103,16 @@ Json options_json(const PictureOptions& picture, const ExecutionOptions& executi
           {"tile_sample", picture.tile_sample},
           {"bounces", picture.shading.bounces},
           {"seed", picture.shading.seed},
+          {"environment", environment_text(picture.shading.environment)},
           {"order", order_name(execution.order)},
           {"policy", execution.policy},
           {"queue_capacity", execution.policy_options.queue_capacity},
+          {"rays_ahead", execution.policy_options.rays_ahead},
+          {"eviction", execution.paging.eviction},
+          {"read_depth", execution.paging.read_depth},
+          {"read_backend", result.read_backend},
+          {"buffered_reads", scene.file->read_mode() == ReadMode::kBuffered},
+          {"state_levels", scene.top_tree.more_levels()},
           {"max_memory_bytes", execution.max_memory_bytes},
           {"page_cache_bytes", execution.page_cache_bytes},
           {"rays_in_flight", execution.rays_in_flight}};
@@ -144,7 +160,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   Json json;
   json["schema_version"] = 1;
   json["program"] = "Shoal " SHOAL_VERSION;
-  json["options"] = options_json(picture, execution);
+  json["options"] = options_json(result, scene, picture, execution);
   json["machine"] = machine_json();
   json["scene"] = {{"file", scene.file->path()},
                    {"file_bytes", scene.file->file_bytes()},

@@ -114,6 +114,8 @@ class PageCache {
   Prefetch prefetch_pair(PageId page, CacheCounters& counters);
   /// Moves the pages that prefetches brought since the last call to `pages` (cleared first).
   void take_loaded(std::vector<PageId>& pages);
+  /// How pages are read ahead: "io_uring" or "threads"; "none": they are not.
+  const char* read_backend() const;
   /// Prefetches under way.
   unsigned loading_count() const;
   /// Sleeps until a prefetch ends or the time is over; returns at once when none is under way or some are not taken yet.

@@ -51,6 +51,7 @@ Result<std::unique_ptr<PageFile>> PageFile::open(FileSystem& fs, const std::stri
   std::unique_ptr<PageFile> pages(new PageFile());
   pages->path_ = path;
   pages->file_bytes_ = file->size_bytes();
+  pages->read_mode_ = mode;
   pages->records_ = std::move(directory.records);
   pages->tables_ = std::move(directory.tables);
   pages->file_ = std::move(file);

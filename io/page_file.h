@@ -90,6 +90,8 @@ class PageFile {
 
   const std::string& path() const { return path_; }
   uint64_t file_bytes() const { return file_bytes_; }
+  /// As it was asked for.
+  ReadMode read_mode() const { return read_mode_; }
   std::span<const PageRecord> records() const { return records_; }
   uint32_t page_count() const { return static_cast<uint32_t>(records_.size()); }
   /// Requires: id < page_count().
@@ -119,6 +121,7 @@ class PageFile {
   const TableRange* find_table(TableId table) const;
   std::string path_;
   uint64_t file_bytes_ = 0;
+  ReadMode read_mode_ = ReadMode::kBuffered;
   std::vector<PageRecord> records_;
   std::vector<TableRange> tables_;
   std::unique_ptr<ReadableFile> file_;

@@ -102,6 +102,8 @@ void PageCache::take_loaded(std::vector<PageId>& pages) {
   std::swap(pages, state_->prefetched);
 }
 
+const char* PageCache::read_backend() const { return state_->loader == nullptr ? "none" : state_->loader->backend(); }
+
 unsigned PageCache::loading_count() const { return state_->loader == nullptr ? 0 : state_->loader->under_way(); }
 
 void PageCache::wait_for_load(std::chrono::microseconds at_most) {

@@ -93,6 +93,7 @@ class TopTree {
   std::span<const Instance> instances() const { return instances_; }
   Bounds3 bounds() const;  ///< of the scene, world space
   uint64_t resident_bytes() const;
+  uint32_t more_levels() const { return options_.more_levels; }
 
  private:
   std::vector<TopNode> nodes_;

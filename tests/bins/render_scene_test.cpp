@@ -49,7 +49,10 @@ void expect_stats(const json& stats, uint64_t samples) {
   if (::testing::Test::HasFailure()) return;
   EXPECT_EQ(stats["schema_version"], 1);
   expect_keys(stats["options"], {"width", "height", "samples_per_pixel", "camera", "bounces", "seed", "order",
-                                 "policy", "max_memory_bytes"});
+                                 "policy", "eviction", "read_depth", "rays_ahead", "state_levels", "max_memory_bytes"});
+  EXPECT_FALSE(stats["options"]["environment"].get<std::string>().empty());
+  EXPECT_FALSE(stats["options"]["buffered_reads"].get<bool>());
+  EXPECT_THAT(stats["options"]["read_backend"].get<std::string>(), ::testing::AnyOf("io_uring", "threads", "none"));
   expect_keys(stats["machine"], {"cpu", "hardware_threads_count", "memory_limit_bytes", "system", "compiler"});
   expect_keys(stats["scene"], {"file", "file_bytes", "triangles_count", "treelets_count", "instances_count"});
   expect_keys(stats["counters"], {"totals", "by_kind", "by_bounce"});
@@ -116,6 +119,8 @@ TEST(RenderScene, CompareFindsTheOrdersIdentical) {
   for (const char* order : {"queued", "depth-first"}) {
     expect_stats(report["orders"][order], 24 * 16);
     EXPECT_EQ(report["orders"][order]["options"]["order"], order);
+    const bool ahead = report["orders"][order]["options"]["read_backend"] != "none";
+    EXPECT_EQ(ahead, order == std::string("queued"));
   }
   EXPECT_EQ(report["orders"]["queued"]["counters"]["totals"]["rays_traced_count"],
             report["orders"]["depth-first"]["counters"]["totals"]["rays_traced_count"]);
