@@ -5,7 +5,6 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -13,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "engine/clock.h"
 #include "engine/generate.h"
 #include "engine/render_report.h"
 #include "io/gltf_accessor.h"
@@ -43,8 +43,6 @@ T value_or_stop(Result<T> result) {
   if (!result.ok()) stop(result.error());
   return std::move(result).value();
 }
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 /// A glTF's triangles as Embree takes them. Meshes that several nodes show count once, untransformed: for a rate of
 /// building that is the same work.
@@ -96,12 +94,12 @@ double build_scene_seconds(RTCDevice device, const Triangles& triangles) {
                              triangles.vertices.size() / 3);
   rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, triangles.indices.data(), 0, 12,
                              triangles.count());
-  const double start = now();
+  const double start = now_seconds();
   rtcCommitGeometry(mesh);
   rtcAttachGeometry(scene, mesh);
   rtcReleaseGeometry(mesh);
   rtcCommitScene(scene);
-  const double seconds = now() - start;
+  const double seconds = now_seconds() - start;
   rtcReleaseScene(scene);
   return seconds;
 }
@@ -150,9 +148,9 @@ double build_bvh_seconds(RTCDevice device, std::vector<RTCBuildPrimitive> boxes)
     for (size_t i = 0; i < count; ++i) leaf[i + 1] = primitives[i].primID;
     return static_cast<void*>(leaf);
   };
-  const double start = now();
+  const double start = now_seconds();
   const void* root = rtcBuildBVH(&arguments);
-  const double seconds = now() - start;
+  const double seconds = now_seconds() - start;
   rtcReleaseBVH(bvh);
   return root != nullptr ? seconds : 0;
 }

@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "bench/figures.h"
+#include "engine/clock.h"
 #include "engine/render_report.h"
 #include "io/aligned_buffer.h"
 #include "io/page_file.h"
@@ -15,10 +15,6 @@
 
 namespace shoal::bench {
 namespace {
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 /// Where pages are decoded to while the whole file is read: as many as are under way.
 class PagePlaces {
@@ -62,7 +58,7 @@ double seconds_to_read(const std::string& scene, unsigned threads) {
   PagingOptions paging;
   paging.loader_threads = threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
   PagePlaces places(*file.value(), paging.read_depth);
-  const double start = now();
+  const double start = now_seconds();
   {
     PageLoader loader(*file.value(), paging,
                       [&](PageId, std::byte* out, Status status, PageLoader::ReadShare) { places.give_back(out, status); });
@@ -74,7 +70,7 @@ double seconds_to_read(const std::string& scene, unsigned threads) {
     loader.finish();
   }
   if (!places.error().ok()) give_up(places.error().error().message);
-  return now() - start;
+  return now_seconds() - start;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <random>
 #include <thread>
 
+#include "engine/clock.h"
 #include "engine/frame.h"
 #include "engine/path_ray.h"
 #include "engine/queued_paths.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/render_worker.h"
+#include "engine/clock.h"
 #include "io/image.h"
 
 namespace shoal {

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "engine/clock.h"
 #include "engine/preview.h"
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"

@@ -1,19 +1,15 @@
 #include "engine/render_worker.h"
 
-#include <chrono>
 #include <cmath>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "engine/clock.h"
 #include "engine/preview.h"
 
 namespace shoal {
-
-double now_seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 void RenderContext::fail(Error new_error) {
   std::lock_guard guard(mutex);

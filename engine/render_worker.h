@@ -58,9 +58,6 @@ struct RenderContext {
   }
 };
 
-/// Seconds of a monotonic clock.
-double now_seconds();
-
 class QueuedPaths;
 class TreeletScheduler;
 class UsualBatches;

@@ -1,6 +1,8 @@
 #include "engine/treelet_scheduler.h"
 
-#include "engine/render_worker.h"
+#include <algorithm>
+
+#include "engine/clock.h"
 
 namespace shoal {
 namespace {
