@@ -7,7 +7,6 @@
 
 #include "engine/chunk_records.h"
 #include "engine/place_instances.h"
-#include "engine/process_memory.h"
 #include "engine/stream_object.h"
 #include "io/glb.h"
 #include "io/write_behind.h"
@@ -140,8 +139,6 @@ uint64_t BuildMemoryPlan::write_buffer_bytes(uint64_t chunks) const {
   return std::clamp(align_down(buffers_bytes / std::max<uint64_t>(chunks, 1), kBlockBytes), kBlockBytes,
                     kMaxWriteBufferBytes);
 }
-
-uint64_t default_build_cap_bytes() { return memory_limit_bytes() / 10 * 7; }
 
 Result<BuildMemoryPlan> plan_build_memory(const BuildMemoryNeeds& needs, uint64_t cap_bytes, const std::string& path) {
   const Largest largest = largest_of(needs);

@@ -53,9 +53,6 @@ struct BuildMemoryPlan {
   uint64_t write_buffer_bytes(uint64_t chunks) const;
 };
 
-/// The cap that is used when none is given: 70 % of what there is.
-uint64_t default_build_cap_bytes();
-
 /// Fails with: kMemoryCap (the message names the smallest cap that works).
 Result<BuildMemoryPlan> plan_build_memory(const BuildMemoryNeeds& needs, uint64_t cap_bytes, const std::string& path);
 

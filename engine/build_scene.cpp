@@ -100,7 +100,7 @@ class SceneBuilder {
   }
 
   uint64_t cap_bytes() const {
-    return options_.max_memory_bytes > 0 ? options_.max_memory_bytes : default_build_cap_bytes();
+    return options_.max_memory_bytes > 0 ? options_.max_memory_bytes : default_cap_bytes();
   }
 
   /// Shares the cap out, before anything of size is read.

@@ -23,7 +23,7 @@ struct BuildProgress {
 struct SceneBuildOptions {
   uint32_t treelet_bytes = 256u << 10;
   unsigned threads = 0;           ///< 0: all
-  uint64_t max_memory_bytes = 0;  ///< of the whole process; 0: 70 % of what there is
+  uint64_t max_memory_bytes = 0;  ///< of the whole process; 0: default_cap_bytes() (engine/process_memory.h)
   std::string scratch_folder;     ///< for objects that do not fit; empty: the folder of the output
   /// Gives the space of the source's binary parts back as soon as each was read for the last time. Destroys the source,
   /// also when the build fails or is stopped later on. Not for .glb.

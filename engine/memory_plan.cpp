@@ -70,7 +70,7 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   const PageSizes pages = page_sizes(scene.file);
   MemoryPlan plan;
   plan.cap_bytes = execution.max_memory_bytes;
-  if (plan.cap_bytes == 0) plan.cap_bytes = memory_limit_bytes() / 10 * 7;
+  if (plan.cap_bytes == 0) plan.cap_bytes = default_cap_bytes();
   plan.process_bytes = scene.process_bytes;
   plan.top_tree_bytes = scene.top_tree_bytes;
   plan.table_bytes = scene.table_bytes;

@@ -33,6 +33,8 @@ uint64_t memory_limit_bytes() {
   return std::min(physical, cgroup_limit_bytes());
 }
 
+uint64_t default_cap_bytes() { return memory_limit_bytes() / 10 * 7; }
+
 #if defined(__GLIBC__)
 void give_back_large_blocks() {
   // Setting it also ends its growth: by itself it rises to the size of what is freed, up to 32 MiB.

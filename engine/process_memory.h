@@ -10,6 +10,8 @@ uint64_t resident_set_bytes();       ///< now
 uint64_t peak_resident_set_bytes();  ///< high-water mark of the process
 /// The smaller of physical memory and every cgroup limit above this process.
 uint64_t memory_limit_bytes();
+/// The cap where none is given: 70 % of that.
+uint64_t default_cap_bytes();
 
 /// From now on large blocks that are freed go back to the system at once. For the whole process; may be called again.
 void give_back_large_blocks();

@@ -40,7 +40,7 @@ struct PreviewOptions {
 struct ExecutionOptions {
   Order order = Order::kQueued;
   unsigned threads = 0;             ///< 0: all
-  uint64_t max_memory_bytes = 0;    ///< of the whole process; 0: 70 % of the smaller of memory and cgroup limit
+  uint64_t max_memory_bytes = 0;    ///< of the whole process; 0: default_cap_bytes() (engine/process_memory.h)
   uint64_t process_bytes = 0;       ///< of plan_before_tables(), so that every plan says the same; 0: measured
   uint64_t page_cache_bytes = 0;    ///< 0: from the plan
   /// 0: from the plan. Two a path, at least one block (64), at most 2 kMaxPathsInFlight.
