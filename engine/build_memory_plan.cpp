@@ -7,6 +7,7 @@
 
 #include "engine/chunk_records.h"
 #include "engine/place_instances.h"
+#include "engine/read_mesh.h"
 #include "engine/stream_object.h"
 #include "io/glb.h"
 #include "io/write_behind.h"
@@ -59,9 +60,7 @@ struct Largest {
 Largest largest_of(const BuildMemoryNeeds& needs) {
   Largest largest;
   for (const BuildMemoryNeeds::Object& object : needs.objects) {
-    CornerLayout& l = largest.layout;
-    l = {l.normal || object.layout.normal, l.tangent || object.layout.tangent, l.color || object.layout.color,
-         std::max(l.uv_count, object.layout.uv_count)};
+    largest.layout = united(largest.layout, object.layout);
     largest.triangles += object.triangles;
     largest.object_triangles = std::max(largest.object_triangles, object.triangles);
     largest.object_bytes = std::max(largest.object_bytes, built_bytes(object.triangles, object.layout));

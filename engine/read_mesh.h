@@ -26,6 +26,7 @@ struct PrimitiveSource {
 /// What the corners of a primitive have to carry: NORMAL when there, TANGENT when there and a normal map uses it,
 /// COLOR_0 when there, the UV sets of the material's textures.
 CornerLayout layout_of(const gltf::Primitive& primitive, const MaterialPlan& plan);
+/// All that either carries.
 CornerLayout united(const CornerLayout& a, const CornerLayout& b);
 
 /// Triangles of one primitive, decoded. Kept from read to read, so that its memory is.
