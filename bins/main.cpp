@@ -5,13 +5,9 @@
 #include <map>
 #include <new>
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #include "bins/choice_option.h"
 #include "bins/command.h"
-#include "engine/render_report.h"
+#include "engine/process_memory.h"
 
 namespace {
 
@@ -27,17 +23,6 @@ void declare_console(CLI::App& app, shoal::Console& console, bool& quiet) {
   shoal::add_choice(app, "--log-level", console.level, kLevels)->type_name("LEVEL");
   shoal::add_choice(app, "--progress", console.progress, kModes)->type_name("MODE");
   app.add_flag("--quiet", quiet, "errors only");
-}
-
-/// What is freed must leave the process, or the next part of the plan is taken beside it. By default glibc keeps freed
-/// memory in up to 8 arenas a core, and raises the size from which memory comes straight from the system (and goes back
-/// to it) to 32 MiB once a block of that size was freed; setting a threshold keeps it where it is.
-void give_freed_memory_back() {
-#ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 256 * 1024);
-  mallopt(M_TRIM_THRESHOLD, 256 * 1024);
-  mallopt(M_ARENA_MAX, 2);
-#endif
 }
 
 int run(int argc, char** argv) {
@@ -72,7 +57,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  give_freed_memory_back();
+  shoal::give_back_when_freed();
   std::signal(SIGXFSZ, SIG_IGN);  // a file larger than the user's limit is an error to report, not an end
   try {
     return run(argc, argv);

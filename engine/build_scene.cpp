@@ -38,7 +38,7 @@ class SceneBuilder {
 
   Result<SceneBuildReport> run(const std::string& output) {
     const auto start = std::chrono::steady_clock::now();
-    give_back_large_blocks();
+    give_back_when_freed();
     scratch_folder_ = options_.scratch_folder;
     if (scratch_folder_.empty()) scratch_folder_ = std::filesystem::path(output).parent_path().string();
     if (scratch_folder_.empty()) scratch_folder_.push_back('.');

@@ -36,13 +36,18 @@ uint64_t memory_limit_bytes() {
 uint64_t default_cap_bytes() { return memory_limit_bytes() / 10 * 7; }
 
 #if defined(__GLIBC__)
-void give_back_large_blocks() {
-  // Setting it also ends its growth: by itself it rises to the size of what is freed, up to 32 MiB.
-  mallopt(M_MMAP_THRESHOLD, 128 << 10);
+void give_back_when_freed() {
+  // By default glibc keeps freed memory in up to 8 arenas a core, and raises the size from which memory comes straight
+  // from the system (and goes back to it) to 32 MiB once a block of that size was freed; setting a threshold keeps it
+  // where it is: at the size that glibc begins with.
+  constexpr int kLargeBlockBytes = 128 << 10;
+  mallopt(M_MMAP_THRESHOLD, kLargeBlockBytes);
+  mallopt(M_TRIM_THRESHOLD, 2 * kLargeBlockBytes);
+  mallopt(M_ARENA_MAX, 2);
 }
 void give_back_freed_memory() { malloc_trim(0); }
 #else
-void give_back_large_blocks() {}
+void give_back_when_freed() {}
 void give_back_freed_memory() {}
 #endif
 

@@ -13,8 +13,9 @@ uint64_t memory_limit_bytes();
 /// The cap where none is given: 70 % of that.
 uint64_t default_cap_bytes();
 
-/// From now on large blocks that are freed go back to the system at once. For the whole process; may be called again.
-void give_back_large_blocks();
+/// From now on what is freed leaves the process, or the next part of a plan is taken beside it: large blocks at once, of
+/// the rest all but little. For the whole process; may be called again.
+void give_back_when_freed();
 /// Gives back what the allocator keeps of freed memory. Cost: a system call an arena.
 void give_back_freed_memory();
 
