@@ -24,12 +24,6 @@ struct OrderResult {
   RenderResult result;
 };
 
-Result<Order> parse_order(const std::string& name) {
-  if (name == "queued") return Order::kQueued;
-  if (name == "depth-first") return Order::kDepthFirst;
-  return Error{ErrorCode::kUsage, fmt::format("unknown order '{}': expected queued or depth-first", name)};
-}
-
 Result<std::vector<OrderResult>> render_orders(const Arguments& arguments, PreparedRender& prepared,
                                                Console& console) {
   std::vector<OrderResult> results;

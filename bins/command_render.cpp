@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <map>
 #include <memory>
 
 #include "bins/choice_option.h"
@@ -86,7 +85,6 @@ int run_render(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void declare_render(CLI::App& app, Console& console, Command& command) {
-  static const std::map<std::string, Order> kOrders{{"queued", Order::kQueued}, {"depth-first", Order::kDepthFirst}};
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("render", "scene to picture");
   arguments->render.declare(*sub);
@@ -97,7 +95,7 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--tonemap", arguments->tonemap, "of --png and --preview: pbr-neutral, none")->capture_default_str();
   sub->add_option("--exposure", arguments->exposure, "of --png and --preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
-  add_choice(*sub, "--order", arguments->render.execution.order, kOrders, " (the picture is the same)")
+  add_choice(*sub, "--order", arguments->render.execution.order, order_choices(), " (the picture is the same)")
       ->type_name("ORDER");
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_render(*arguments, console); };

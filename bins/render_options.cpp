@@ -148,6 +148,18 @@ Result<EnvironmentOptions> parse_environment(const std::string& text) {
   return environment;
 }
 
+const std::map<std::string, Order>& order_choices() {
+  static const std::map<std::string, Order> kOrders{{"queued", Order::kQueued}, {"depth-first", Order::kDepthFirst}};
+  return kOrders;
+}
+
+Result<Order> parse_order(const std::string& name) {
+  const auto at = order_choices().find(name);
+  if (at != order_choices().end()) return at->second;
+  return Error{ErrorCode::kUsage,
+               fmt::format("unknown order '{}': expected one of {}", name, choice_names(order_choices()))};
+}
+
 Status check_output(const std::string& path) {
   std::error_code code;
   const std::filesystem::file_status found = std::filesystem::status(path, code);

@@ -2,6 +2,7 @@
 // the sky. Called by bins.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,11 @@ Result<uint64_t> parse_size(const std::string& text);
 Result<uint32_t> parse_treelet_size(const std::string& text);
 /// "constant:R,G,B", "F.hdr", "F.exr". Fails with: kUsage.
 Result<EnvironmentOptions> parse_environment(const std::string& text);
+
+/// "queued" or "depth-first". Fails with: kUsage.
+Result<Order> parse_order(const std::string& name);
+/// Both, by name.
+const std::map<std::string, Order>& order_choices();
 
 /// Whether a file can be put at `path`: its folder is there and can be written, and what is there already is a file (the
 /// rename would take the place of a device or a pipe as well). Asked before long work. Fails with: kStorage.

@@ -126,7 +126,7 @@ TEST(Usage, WhatDoesNotFitTheSceneExitsTwo) {
   expect({"--policy", "laziest"}, {"unknown policy 'laziest'", "resident-first", "sweep"});
   expect_error(run_shoal(folder, {"compare", folder / "terrain.shoal", "--orders", "queued,zigzag", "--out",
                                   folder / "c", "--width", "8", "--height", "8", "--spp", "1"}),
-               2, {"unknown order 'zigzag'", "queued or depth-first"});
+               2, {"unknown order 'zigzag'", "queued, depth-first"});
   EXPECT_THAT(folder.names(), ::testing::ElementsAre("terrain", "terrain.shoal"));
 }
 
