@@ -1,7 +1,8 @@
 // bench/build_rate: million triangles a second from .gltf to .shoal under a cap smaller than the scene, beside Embree's
 // medium-quality BVH of the same triangles in memory, with as many threads and on the same machine in the same minutes.
 //
-//   bench/build_rate [--triangles N] [--gltf F.gltf] [--cap BYTES] [--threads N] [--folder DIR] [--short] [--json F]
+//   bench/build_rate [--triangles N] [--gltf F.gltf] [--cap BYTES] [--threads N] [--folder DIR] [--program SHOAL]
+//       [--short] [--json F]
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 

@@ -119,7 +119,7 @@ TEST(RenderScene, CompareFindsTheOrdersIdentical) {
   for (const char* order : {"queued", "depth-first"}) {
     expect_stats(report["orders"][order], 24 * 16);
     EXPECT_EQ(report["orders"][order]["options"]["order"], order);
-    const bool ahead = report["orders"][order]["options"]["read_backend"] != "none";
+    const bool ahead = report["orders"][order]["options"]["read_backend"].get<std::string>() != "none";
     EXPECT_EQ(ahead, order == std::string("queued"));
   }
   EXPECT_EQ(report["orders"]["queued"]["counters"]["totals"]["rays_traced_count"],
