@@ -231,15 +231,20 @@ TEST(BuildChunks, RefuseATinyCapAndWorkWithTheOneNamed) {
   EXPECT_EQ(built.report.triangles_count, 100000u);
 }
 
-TEST(BuildChunks, ConsumeThePartsOfTheSourceAndNothingElse) {
-  const TemporaryFolder folder;
+/// The path of its glTF.
+std::string terrain_of(uint64_t triangles, const std::string& out_dir) {
   GenerateOptions terrain;
   terrain.kind = "terrain";
-  terrain.triangles = 60000;
-  terrain.out_dir = folder / "terrain";
+  terrain.triangles = triangles;
+  terrain.out_dir = out_dir;
   const auto generated = generate_scene(posix_file_system(), terrain);
-  ASSERT_TRUE(generated.ok()) << generated.error().message;
-  const std::string gltf = generated.value().gltf_path, part = folder / "terrain/terrain-000.bin";
+  EXPECT_TRUE(generated.ok()) << generated.error().message;
+  return generated.ok() ? generated.value().gltf_path : "";
+}
+
+TEST(BuildChunks, ConsumeThePartsOfTheSourceAndNothingElse) {
+  const TemporaryFolder folder;
+  const std::string gltf = terrain_of(60000, folder / "terrain"), part = folder / "terrain/terrain-000.bin";
   const auto size = std::filesystem::file_size(part);
   const BuiltScene whole = build_and_open(posix_file_system(), {}, gltf, folder / "whole.shoal");
   SceneBuildOptions options = in_chunks_of(9000);
@@ -292,13 +297,7 @@ void show_part_by_second_name(const std::string& gltf, const std::string& name) 
 
 void consume_part_of_two_names(const std::string& name, SceneBuildOptions options) {
   const TemporaryFolder folder;
-  GenerateOptions terrain;
-  terrain.kind = "terrain";
-  terrain.triangles = 30000;
-  terrain.out_dir = folder / "terrain";
-  const auto generated = generate_scene(posix_file_system(), terrain);
-  ASSERT_TRUE(generated.ok()) << generated.error().message;
-  const std::string gltf = generated.value().gltf_path;
+  const std::string gltf = terrain_of(30000, folder / "terrain");
   std::filesystem::create_directory_symlink(".", folder / "terrain/link");
   show_part_by_second_name(gltf, name);
   const BuiltScene whole = build_and_open(posix_file_system(), {}, gltf, folder / "whole.shoal");
