@@ -42,7 +42,7 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
 
 /// How often a render with a preview goes over the whole picture before the order of tiles begins: until every pixel has
 /// a sample where all pages fit in the cache. Else what is in flight would be spread over the whole scene all that time:
-/// 2.4 % of a picture were done when 3.8 % are without a preview (demo of 1 G triangles, 1920 x 1080, cap 1.5G, 25 s).
+/// 2.4 % of a picture were done when 3.8 % are without a preview (terrain of 1 G triangles, 1920 x 1080, cap 1.5G, 25 s).
 uint32_t coarse_levels(const MemoryPlan& plan) {
   constexpr uint32_t kLevelsOutOfCore = 3;
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;

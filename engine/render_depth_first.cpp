@@ -1,7 +1,6 @@
 // Depth-first: each path alone from camera to end, its treelets pinned on demand (least recently used leave). The
 // baseline that the queued order is compared with: same pages, same kernels, same shading.
 #include <chrono>
-#include <new>
 #include <thread>
 
 #include "engine/render_worker.h"
@@ -74,14 +73,7 @@ class DepthFirstWorker {
 }  // namespace
 
 void render_depth_first(RenderContext& context) {
-  run_on_threads(context.threads, [&](unsigned) {
-    try {
-      DepthFirstWorker(context).run();
-    } catch (const std::bad_alloc&) {  // the other threads might wait for this one's samples for ever
-      context.ended = true;
-      context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
-    }
-  });
+  run_on_threads(context, [&] { DepthFirstWorker(context).run(); });
 }
 
 }  // namespace shoal

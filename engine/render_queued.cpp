@@ -2,7 +2,6 @@
 // hand, shades the paths and traces the rays that wait there, and routes what comes out. All bounces are mixed; new
 // camera samples are admitted as paths end.
 #include <chrono>
-#include <new>
 #include <thread>
 
 #include "engine/queued_paths.h"
@@ -167,14 +166,7 @@ class QueuedWorker {
 }  // namespace
 
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches) {
-  run_on_threads(context.threads, [&](unsigned) {
-    try {
-      std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run();
-    } catch (const std::bad_alloc&) {  // the other threads would wait for this one's rays for ever
-      context.ended = true;
-      context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
-    }
-  });
+  run_on_threads(context, [&] { std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run(); });
 }
 
 }  // namespace shoal

@@ -1,6 +1,7 @@
 #include "engine/render_worker.h"
 
 #include <cmath>
+#include <new>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -31,6 +32,17 @@ void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work)
   tbb::task_arena arena(static_cast<int>(threads));
   arena.execute([&] {
     tbb::parallel_for(0u, threads, work, tbb::simple_partitioner());
+  });
+}
+
+void run_on_threads(RenderContext& context, const std::function<void()>& work) {
+  run_on_threads(context.threads, [&](unsigned) {
+    try {
+      work();
+    } catch (const std::bad_alloc&) {
+      context.ended = true;  // first: the message allocates
+      context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
+    }
   });
 }
 

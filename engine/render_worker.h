@@ -127,5 +127,8 @@ void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler&
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work);
+/// The same on the threads of a render. Memory that runs out in one of them ends it for all: they would wait for its
+/// rays or samples for ever.
+void run_on_threads(RenderContext& context, const std::function<void()>& work);
 
 }  // namespace shoal
