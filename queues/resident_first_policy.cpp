@@ -6,6 +6,10 @@
 namespace shoal {
 namespace {
 
+/// A batch in memory is small beside one of so many times its size. (With 1 the last rays, where every batch is below
+/// the minimum, had a decision for nearly every drain: 25,000 treelets in memory took 62 s instead of 38.)
+constexpr uint32_t kSmallShare = 4;
+
 class ResidentFirstPolicy final : public DrainPolicy {
  public:
   explicit ResidentFirstPolicy(const PolicyOptions& options) : options_(options) {}
@@ -26,7 +30,8 @@ class ResidentFirstPolicy final : public DrainPolicy {
     if (!small_batches) std::erase_if(in_memory_, [&](const auto& w) { return w.waiting < options_.minimum_batch; });
     keep_most_waiting(in_memory_, std::max(options_.drains, 1u));
     // What is small waits while something larger is there to do.
-    while (in_memory_.size() > 1 && in_memory_.back().waiting < options_.minimum_batch) in_memory_.pop_back();
+    const uint32_t least = std::min(options_.minimum_batch, most_in_memory / kSmallShare);
+    while (in_memory_.size() > 1 && in_memory_.back().waiting < least) in_memory_.pop_back();
     for (const WaitingTreelet& w : in_memory_) decision.drain.push_back(w.treelet);
     load_most_wanted(decision);
     decision.rays_in_memory = rays_in_memory;

@@ -97,11 +97,18 @@ TEST(DrainPolicy, ResidentFirstPrefersMemoryUnlessItsBatchIsSmall) {
 
 TEST(DrainPolicy, ResidentFirstReadsAheadWhatMostWaitForAndDrainsSmallBatchesMeanwhile) {
   const auto policy = make_resident_first_policy({.minimum_batch = 64, .loads = 2, .rays_ahead = 1000});
-  const Decision decision = decide(*policy, work({500, 10, 20, 600, 400}, {false, true, true}));
+  const Decision decision = decide(*policy, work({500, 4, 26, 600, 400}, {false, true, true}));
   EXPECT_EQ(decision.drain, Ids{2});  // the larger of the small ones: what it sends on may fill the other
   EXPECT_EQ(decision.load, (Ids{3, 0}));
   EXPECT_EQ(decision.rays_in_memory, 30u);
   EXPECT_EQ(decision.load_below_rays, 1000u);
+}
+
+TEST(DrainPolicy, ResidentFirstDrainsAllBatchesOfLikeSizeInOneDecisionWhenAllAreSmall) {
+  const auto policy = make_resident_first_policy({.minimum_batch = 64});
+  EXPECT_EQ(decide(*policy, work({20, 30, 8, 6}, {true, true, true, true})).drain, (Ids{1, 0, 2}));
+  EXPECT_EQ(decide(*policy, work({1, 1, 1}, {true, true, true})).drain, (Ids{0, 1, 2}));
+  EXPECT_EQ(decide(*policy, work({4000, 70, 60}, {true, true, true})).drain, (Ids{0, 1}));
 }
 
 TEST(DrainPolicy, FullWaitsForCapacityWhileRaysAreComing) {
