@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "io/huge_memory.h"
 #include "treelets/ray.h"
 
 namespace shoal {
@@ -15,8 +16,7 @@ namespace shoal {
 class PathLists {
  public:
   PathLists(uint32_t list_count, uint32_t path_count)
-      : lists_(std::make_unique<List[]>(list_count)),
-        links_(std::make_unique_for_overwrite<uint32_t[]>(path_count)) {}
+      : lists_(std::make_unique<List[]>(list_count)), links_(path_count) {}
 
   static uint64_t bytes(uint32_t list_count, uint32_t path_count) {
     return uint64_t{list_count} * sizeof(List) + uint64_t{path_count} * sizeof(uint32_t);
@@ -57,7 +57,7 @@ class PathLists {
     std::atomic<int32_t> count{0};
   };
   std::unique_ptr<List[]> lists_;
-  std::unique_ptr<uint32_t[]> links_;
+  HugeArray<uint32_t> links_;
 };
 
 }  // namespace shoal

@@ -6,8 +6,7 @@
 
 namespace shoal {
 
-RayBlockPool::RayBlockPool(uint32_t block_count)
-    : blocks_(std::make_unique_for_overwrite<RayBlock[]>(block_count)), counts_(block_count), nexts_(block_count) {}
+RayBlockPool::RayBlockPool(uint32_t block_count) : blocks_(block_count), counts_(block_count), nexts_(block_count) {}
 
 BlockId RayBlockPool::acquire() {
   std::lock_guard guard(lock_);

@@ -9,9 +9,9 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
+#include "io/huge_memory.h"
 #include "queues/spin_lock.h"
 #include "treelets/ray.h"
 
@@ -42,7 +42,7 @@ class RayBlockPool {
   static uint64_t bytes(uint32_t block_count) { return uint64_t{block_count} * (sizeof(RayBlock) + 8); }
 
  private:
-  std::unique_ptr<RayBlock[]> blocks_;
+  HugeArray<RayBlock> blocks_;
   std::vector<uint32_t> counts_;
   std::vector<BlockId> nexts_;
   SpinLock lock_;
