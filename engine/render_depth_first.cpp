@@ -55,6 +55,7 @@ class DepthFirstWorker {
 
   /// Traces the ray through every treelet on its way.
   bool travel(Ray& ray) {
+    worker_.begin_ray();
     TreeletId treelet = worker_.next_treelet(ray);
     while (treelet != kNoIndex) {
       if (!worker_.take_in_hand(treelet)) return false;

@@ -79,6 +79,7 @@ class QueuedWorker {
     if (!worker_.take_in_hand(treelet) || (path != kNoIndex && !worker_.pin_attributes())) return;
     while (path != kNoIndex && !context_.ended.load(std::memory_order_relaxed)) {
       const uint32_t next = paths_.to_shade.next(path);
+      if (next != kNoIndex) paths_.prefetch(next);
       ray_count_ = 0;
       vertex_ready(path);
       handle_rays();
@@ -87,6 +88,7 @@ class QueuedWorker {
     while (const uint32_t count = batch.next_block(block_)) {
       worker_.counters().ray_moved_bytes += count * sizeof(Ray);
       for (uint32_t i = 0; i < count && !context_.ended.load(std::memory_order_relaxed); ++i) {
+        if (i + 1 < count) paths_.prefetch(path_index_of(block_.rays[i + 1]));
         ++worker_.ray_counters(block_.rays[i]).rays_drained_count;
         ray_count_ = 0;
         cross_treelets(block_.rays[i]);
@@ -100,12 +102,14 @@ class QueuedWorker {
   void handle_rays() {
     while (ray_count_ > 0) {
       Ray ray = rays_[--ray_count_];
+      worker_.begin_ray();
       route(ray, worker_.next_treelet(ray));
     }
   }
 
   /// The ray stands on an entry of the treelet in hand.
   void cross_treelets(Ray& ray) {
+    worker_.begin_ray();
     worker_.trace(ray);
     const TreeletId next = worker_.next_treelet(ray);
     if (next != kNoIndex && next != worker_.in_hand()) ++worker_.ray_counters(ray).ray_exits_count;

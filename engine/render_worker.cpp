@@ -78,7 +78,7 @@ void RenderWorker::trace(Ray& ray) {
   RayCounters& rays = ray_counters(ray);
   const uint64_t nodes = trace_counters_.node_tests_count, triangles = trace_counters_.triangle_tests_count;
   trace_treelet(geometry_.bytes(), context_.scene.top_tree.current(ray),
-                context_.scene.top_tree.instance(ray.instance), ray, trace_counters_);
+                context_.scene.top_tree.instance(ray.instance), ray, ray_context_, trace_counters_);
   rays.node_tests_count += trace_counters_.node_tests_count - nodes;
   rays.triangle_tests_count += trace_counters_.triangle_tests_count - triangles;
   ++counters_.treelet_visits_count;
@@ -86,7 +86,7 @@ void RenderWorker::trace(Ray& ray) {
 
 TreeletId RenderWorker::next_treelet(Ray& ray) {
   if (ray.any_hit() && ray.hit.valid()) return kNoIndex;
-  const uint32_t entry = context_.scene.top_tree.next(ray, ray_counters(ray).node_tests_count);
+  const uint32_t entry = context_.scene.top_tree.next(ray, ray_context_, ray_counters(ray).node_tests_count);
   return entry == kNoIndex ? kNoIndex : context_.scene.top_tree.entry(entry).treelet;
 }
 

@@ -11,6 +11,7 @@
 #include "engine/render.h"
 #include "engine/sample_order.h"
 #include "io/page_cache.h"
+#include "treelets/ray_space.h"
 #include "treelets/trace_treelet.h"
 
 namespace shoal {
@@ -69,6 +70,8 @@ class RenderWorker {
   /// Begins sample `index` in `path`; returns its camera ray.
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
 
+  /// The calls of trace() and next_treelet() up to the next begin_ray() are about one ray.
+  void begin_ray() { ray_context_.reset(); }
   /// Traces the ray through the treelet in hand. Requires: the cursor stands on an entry of that treelet.
   void trace(Ray& ray);
   /// Next treelet of the ray, or kNoIndex when its answer is known.
@@ -108,6 +111,7 @@ class RenderWorker {
   RenderContext& context_;
   Shader shader_;
   PagePin geometry_, attributes_;
+  RayContext ray_context_;
   TreeletId in_hand_ = kNoIndex;
   TreeletId attributes_of_ = kNoIndex;
   RenderCounters counters_;
