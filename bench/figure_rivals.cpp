@@ -111,10 +111,12 @@ Figure figure_rivals(const Setup& setup, const Rivals& rivals) {
     table.add("depth-first, " + std::filesystem::path(scene).stem().string(), run, read, fill_bytes(scene, run), cap,
               rivals.tile_sample == 1);
   }
-  if (!rivals.mapped) return figure;
+  std::vector<std::string> advices = rivals.advices;
+  std::erase(advices, "none");
+  if (advices.empty()) return figure;
   const std::string pages = rivals.mapped_pages.empty() ? setup.folder + "/mapped.pages" : rivals.mapped_pages;
   if (const Status made = make_mapped_pages(setup.scene, pages); !made.ok()) give_up(made.error().message);
-  for (const char* advice : {"normal", "random"}) table.add_mapped(cap, pages, advice);
+  for (const std::string& advice : advices) table.add_mapped(cap, pages, advice);
   return figure;
 }
 

@@ -24,7 +24,7 @@ struct Rivals {
   double share = 0.25;
   std::vector<std::string> scenes;  ///< the same source with other treelet sizes, depth-first
   std::string mapped_pages;         ///< kept or made; empty: in the folder, removed afterwards
-  bool mapped = true;
+  std::vector<std::string> advices = {"normal", "random"};  ///< for mapped pages; none: without that rival
   uint32_t tile_sample = 64;
 };
 /// Queued against depth-first and against depth-first over memory-mapped pages, all in the same memory.

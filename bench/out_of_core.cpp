@@ -76,7 +76,10 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
   rivals->add_option("--tile-sample", a.rivals.tile_sample, "the rivals render one in so many tiles")
       ->capture_default_str();
   rivals->add_option("--pages", a.rivals.mapped_pages, "decoded pages for mmap, made if missing and kept");
-  rivals->add_flag("!--no-mmap", a.rivals.mapped, "leave out the memory-mapped rival");
+  rivals->add_option("--advice", a.rivals.advices, "for mapped pages: normal (read ahead), random, none (no such rival)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"normal", "random", "none"}))
+      ->capture_default_str();
   rivals->callback([&] { figure = [&] { return figure_rivals(a.setup, a.rivals); }; });
 
   CLI::App* amplification = declare_figure(app, a, "amplification", "bytes read over bytes of all pages of the scene");
