@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <array>
-
 #include "bench/figures.h"
 #include "engine/render_report.h"
 
@@ -28,18 +26,20 @@ bool run_once(const Setup& setup, Column& column, const RenderRun* first) {
 
 }  // namespace
 
-Figure figure_quarter(const Setup& setup, double share) {
+Figure figure_quarter(const Setup& setup, double share, bool warm) {
   Figure figure;
   const SceneSizes sizes = scene_sizes(setup.scene);
   const uint64_t cap = cap_for_share(setup, share);
-  std::array<Column, 3> columns{Column{"part", {}, {}, {}}, Column{"all-cold", {}, {}, {}},
-                                Column{"all-warm", {}, {}, {}}};
+  std::vector<Column> columns{{"part", {}, {}, {}}, {"all-cold", {}, {}, {}}};
   columns[0].ask.max_memory_bytes = cap;
-  columns[2].ask.more = {"--buffered-reads"};
+  if (warm) {
+    columns.push_back({"all-warm", {}, {}, {}});
+    columns.back().ask.more = {"--buffered-reads"};
+  }
   fmt::print("{}: {} treelets, {} of pages decoded, {} stored; cap {}\n", setup.scene, sizes.treelets_count,
              format_bytes(sizes.decoded_bytes), format_bytes(sizes.stored_bytes), format_bytes(cap));
   // Once without counting, so that the operating system's cache holds the file for the warm runs if it can.
-  figure.ok = run_render(setup, "all-warm", columns[2].ask).ok();
+  if (warm) figure.ok = run_render(setup, "all-warm", columns.back().ask).ok();
   for (uint32_t run = 0; run < setup.runs && figure.ok; ++run) {
     for (Column& column : columns) {
       figure.ok = figure.ok && run_once(setup, column, &column == &columns[0] ? nullptr : &columns[0].last);

@@ -18,7 +18,7 @@ struct Figure {
 Figure figure_cap_held(const Setup& setup, const std::string& gltf, uint64_t cap_bytes);
 
 /// Time with a share of the pages in the cache against time with all of them.
-Figure figure_quarter(const Setup& setup, double share);
+Figure figure_quarter(const Setup& setup, double share, bool warm = true);
 
 struct Rivals {
   double share = 0.25;

@@ -26,6 +26,7 @@ struct Arguments {
   std::string gltf, json;
   uint64_t cap_bytes = 0;
   double share = 0.25;
+  bool warm = true;
   std::vector<double> shares{0.25, 0.6};
   std::vector<uint64_t> rays{4'000'000, 16'000'000, 64'000'000};
   std::vector<double> factors{0.125, 0.25, 0.5, 1, 2, 4, 8};
@@ -68,7 +69,8 @@ void declare_figures(CLI::App& app, Arguments& a, std::function<Figure()>& figur
 
   CLI::App* quarter = declare_figure(app, a, "quarter", "time with a quarter of the pages in memory and with all");
   quarter->add_option("--share", a.share, "of the pages")->capture_default_str();
-  quarter->callback([&] { figure = [&] { return figure_quarter(a.setup, a.share); }; });
+  quarter->add_flag("!--no-warm", a.warm, "leave out the renders that the operating system's cache serves");
+  quarter->callback([&] { figure = [&] { return figure_quarter(a.setup, a.share, a.warm); }; });
 
   CLI::App* rivals = declare_figure(app, a, "rivals", "queued against depth-first and mmap in the same memory");
   rivals->add_option("--share", a.rivals.share, "of the pages in the queued order's cache")->capture_default_str();
