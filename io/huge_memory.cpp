@@ -20,8 +20,7 @@ HugeMemory map_huge_memory(size_t bytes) {
   const size_t size = align_up(std::max<size_t>(bytes, 1), kBlockBytes);
   const size_t slack = size >= kHugePageBytes ? kHugePageBytes - kBlockBytes : 0;
   if (size < bytes || size + slack < size) throw std::bad_alloc();
-  void* address = ::mmap(nullptr, size + slack, PROT_READ | PROT_WRITE,
-                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  void* address = ::mmap(nullptr, size + slack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (address == MAP_FAILED) throw std::bad_alloc();
   auto* mapped = static_cast<std::byte*>(address);
   auto* data = slack == 0 ? mapped

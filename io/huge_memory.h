@@ -5,7 +5,7 @@
 //   memory     not touched before it is used: it becomes resident piece by piece, 2 MiB at once at most, and never
 //              more than the array's size rounded up to 4 KiB.
 //   threads    none of its own; as an array.
-//   cost       one system call to make it, none after.
+//   cost       a few system calls to make it; then a page fault for 2 MiB, at first touch.
 #pragma once
 
 #include <cstddef>

@@ -1,13 +1,13 @@
-// resident-first: the fullest treelets that are in memory, but none with less than a minimum batch while fuller ones
-// wait on disk; those that most wait for are read ahead, once little is left to trace in memory: what is loaded later
-// is loaded for more rays. Fewest bytes read of the policies measured (docs/decisions/0008, 0013).
+// resident-first: the fullest treelets that are in memory (when nothing can be read ahead, none with less than a
+// minimum batch while fuller ones wait on disk); those that most wait for are read ahead, once little is left to trace
+// in memory: what is loaded later is loaded for more rays. Fewest bytes read of the policies measured (docs/decisions/0008, 0013).
 #include "queues/most_waiting.h"
 
 namespace shoal {
 namespace {
 
-/// A batch in memory is small beside one of so many times its size. (With 1 the last rays, where every batch is below
-/// the minimum, had a decision for nearly every drain: 25,000 treelets in memory took 62 s instead of 38.)
+/// A batch in memory is small beside one of so many times its size. (When every batch below the minimum was, the last
+/// rays had a decision for nearly every drain: a render of 25,000 treelets in memory took 62 s instead of 38.)
 constexpr uint32_t kSmallShare = 4;
 
 class ResidentFirstPolicy final : public DrainPolicy {
