@@ -1,5 +1,6 @@
 // Large arrays that are touched all over, one place after another far away: on large pages of 2 MiB where the system
-// has them, so that most touches find their address translation. Used for rays and paths in flight.
+// has them, so that most touches find their address translation. Used by queues/ray_block_pool,
+// queues/path_lists and engine/queued_paths.
 //
 // Properties and assumptions
 //   memory     not touched before it is used: it becomes resident piece by piece, 2 MiB at once at most, and never

@@ -22,7 +22,7 @@ struct WaitingTreelet {
 
 struct PolicyOptions {
   uint32_t queue_capacity = 4096;  ///< full: a queue is flushed when so many rays and paths wait
-  uint32_t minimum_batch = 64;     ///< resident-first: smaller queues wait while one of four times their size is in memory
+  uint32_t minimum_batch = 64;     ///< resident-first: smaller ones wait while one of four times their size is resident
   uint32_t drains = 32;            ///< treelets to drain of a decision, at most; at least 1
   uint32_t loads = 64;             ///< treelets to load of a decision, at most; 0: nothing can be read ahead
   /// resident-first: while so many rays wait in memory nothing more is read ahead, so that more gather first. 0: a

@@ -1,6 +1,7 @@
 // resident-first: the fullest treelets that are in memory (when nothing can be read ahead, none with less than a
 // minimum batch while fuller ones wait on disk); those that most wait for are read ahead, once little is left to trace
-// in memory: what is loaded later is loaded for more rays. Fewest bytes read of the policies measured (docs/decisions/0008, 0013).
+// in memory: what is loaded later is loaded for more rays. Fewest bytes read of the policies measured
+// (docs/decisions/0008, 0013).
 #include "queues/most_waiting.h"
 
 namespace shoal {
