@@ -33,20 +33,52 @@ double median_seconds(const std::function<void()>& work) {
   return seconds[3];
 }
 
+/// Rays traced together.
+constexpr size_t kGroup = 64;
+
+/// Each ray to its end, a treelet of each at a time.
+void trace_group(const TestScene& scene, const TopTree& tree, std::span<Ray> rays, uint64_t& top_tests,
+                 uint64_t& visits, TraceCounters& counters) {
+  RayContext contexts[kGroup];
+  NextJob next[kGroup];
+  uint32_t count = 0;
+  for (Ray& ray : rays) next[count] = {&ray, &contexts[count]}, ++count;
+  TraceJob jobs[kGroup];
+  while (count > 0) {
+    tree.next({next, count});
+    uint32_t left = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+      top_tests += next[k].node_tests;
+      if (next[k].entry == kNoIndex) continue;
+      const TreeletEntry& e = tree.entry(next[k].entry);
+      Ray& ray = *next[k].ray;
+      jobs[left] = {scene.pages[e.treelet].bytes().data(), &ray,
+                    next[k].context, &tree.instance(ray.instance), e};
+      next[left++] = {&ray, next[k].context};
+    }
+    count = left;
+    visits += count;
+    trace_treelets({jobs, count}, counters);
+    left = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+      if (!next[k].ray->any_hit() || !next[k].ray->hit.valid()) next[left++] = next[k];
+    }
+    count = left;
+  }
+}
+
 void run_ours(const TestScene& scene, const std::vector<Ray>& rays) {
   const TopTree tree(scene.nodes, scene.entries, scene.instances);
   TraceCounters counters;
   uint64_t top_tests = 0, visits = 0, hits = 0;
   const double seconds = median_seconds([&] {
     counters = {}, top_tests = visits = hits = 0;
-    for (Ray ray : rays) {
-      RayContext context;
-      for (uint32_t entry; (entry = tree.next(ray, context, top_tests)) != kNoIndex; ++visits) {
-        const TreeletEntry& e = tree.entry(entry);
-        trace_treelet(scene.pages[e.treelet].bytes(), e, tree.instance(ray.instance), ray, context, counters);
-        if (ray.any_hit() && ray.hit.valid()) break;
-      }
-      hits += ray.hit.valid();
+    std::vector<Ray> group;
+    for (size_t first = 0; first < rays.size(); first += kGroup) {
+      group.assign(rays.begin() + static_cast<long>(first),
+                   rays.begin() + static_cast<long>(std::min(first + kGroup, rays.size())));
+      trace_group(scene, tree, group, top_tests, visits, counters);
+      for (const Ray& ray : group) hits += ray.hit.valid();
     }
   });
   const double n = static_cast<double>(rays.size());

@@ -57,7 +57,7 @@ Status collect_starts(const Scene& scene, std::span<const uint64_t> wanted, std:
         starts.push_back(start_from(leaf, static_cast<uint32_t>(wanted[next] - first), random));
       }
       first += leaf.triangle_count;
-      offset += leaf_bytes(leaf.triangle_count, leaf.vertex_count);
+      offset += leaf.bytes();
     }
   }
   return {};

@@ -19,31 +19,6 @@ const T* at(std::span<const std::byte> bytes, size_t offset) {
   return reinterpret_cast<const T*>(bytes.data() + offset);
 }
 
-/// A leaf that no node of the page names: what check_treelet() checks of those that are named.
-bool leaf_in_page(std::span<const std::byte> bytes, uint64_t offset_bytes) {
-  const TreeletHeader& header = *at<TreeletHeader>(bytes, 0);
-  if (offset_bytes + sizeof(LeafHeader) > header.leaves_bytes) return false;
-  const LeafHeader& leaf = *at<LeafHeader>(bytes, header.leaves_offset + offset_bytes);
-  const uint32_t triangles = leaf.triangle_count, vertices = leaf.vertex_count;
-  if (triangles == 0 || triangles > kMaxLeafTriangles || vertices == 0 || vertices > kMaxLeafVertices) return false;
-  const uint64_t corners_bytes = offset_bytes + sizeof(LeafHeader) + uint64_t{12} * vertices;
-  if (corners_bytes + 3 * triangles > header.leaves_bytes) return false;
-  if (uint64_t{leaf.first_ordinal} + triangles > header.triangle_count) return false;
-  if (leaf.has_coverage && header.coverage_offset == 0) return false;
-  const float* positions = at<float>(bytes, header.leaves_offset + offset_bytes + sizeof(LeafHeader));
-  if (!std::all_of(positions, positions + 3 * vertices, [](float v) { return std::isfinite(v); })) return false;
-  const uint8_t* corners = at<uint8_t>(bytes, header.leaves_offset + corners_bytes);
-  if (std::any_of(corners, corners + 3 * triangles, [&](uint8_t corner) { return corner >= vertices; }))
-    return false;
-  return true;
-}
-
-bool root_in_page(std::span<const std::byte> bytes, NodeRef root) {
-  if (root == kEmptyRef) return false;
-  if (!is_leaf(root)) return root < at<TreeletHeader>(bytes, 0)->node_count;
-  return leaf_in_page(bytes, uint64_t{4} * leaf_offset(root));
-}
-
 class PageChecker {
  public:
   PageChecker(const Scene& scene, const PageRecord& record, std::span<const std::byte> bytes)
@@ -102,9 +77,8 @@ class PageChecker {
     auto entry = std::lower_bound(scene_.entries_by_treelet.begin(), scene_.entries_by_treelet.end(), treelet,
                                   [&](uint32_t index, TreeletId id) { return entries[index].treelet < id; });
     for (; entry != scene_.entries_by_treelet.end() && entries[*entry].treelet == treelet; ++entry) {
-      if (!root_in_page(bytes_, entries[*entry].root)) {
-        return corrupt(fmt::format("expected the root of entry {}, found no node or leaf at {:#x}", *entry,
-                                   entries[*entry].root));
+      if (Status status = check_root(bytes_, entries[*entry].root); !status.ok()) {
+        return corrupt(fmt::format("root of entry {}: {}", *entry, status.error().message));
       }
     }
     return {};

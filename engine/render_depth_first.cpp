@@ -1,5 +1,6 @@
-// Depth-first: each path alone from camera to end, its treelets pinned on demand (least recently used leave). The
-// baseline that the queued order is compared with: same pages, same kernels, same shading.
+// Depth-first: each path by itself from camera to end, its treelets pinned on demand (least recently used leave). The
+// baseline that the queued order is compared with: same pages, same kernels, same shading. A thread has several paths
+// under way, so that the kernels trace their rays together; no ray ever waits for another.
 #include <chrono>
 #include <thread>
 
@@ -12,18 +13,24 @@ constexpr uint64_t kSamplesPerGrab = 256;
 /// Of the first lattice of a preview: the other threads wait for who has the last ones.
 constexpr uint64_t kFirstSamplesPerGrab = 16;
 constexpr std::chrono::microseconds kFirstLatticeWait{200};
+/// Paths under way in a thread. Fewer where their pages would take more than a part of the cache.
+constexpr uint32_t kMaxPaths = 32;
+constexpr uint64_t kCacheParts = 8;
 
 class DepthFirstWorker {
  public:
-  explicit DepthFirstWorker(RenderContext& context) : context_(context), worker_(context) {}
+  explicit DepthFirstWorker(RenderContext& context) : context_(context), worker_(context) {
+    const uint64_t share = context.cache.capacity_bytes() / (kCacheParts * context.threads);
+    const uint64_t page = PageCache::minimum_capacity_bytes(*context.scene.file, 1);
+    path_count_ = static_cast<uint32_t>(std::clamp<uint64_t>(share / std::max<uint64_t>(page, 1), 1, kMaxPaths));
+  }
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed)) {
       const bool first_lattice = context_.next_sample < context_.samples.first_lattice_count();
       const SampleRange samples = context_.begin_samples(first_lattice ? kFirstSamplesPerGrab : kSamplesPerGrab);
       if (samples.first == context_.samples.count()) break;
-      for (uint64_t index = samples.first; index < samples.last && run_path(index); ++index) {
-      }
+      run_paths(samples);
       context_.samples_done += samples.size();
       worker_.report_progress();
       if (samples.size() == 0) std::this_thread::sleep_for(kFirstLatticeWait);
@@ -32,49 +39,99 @@ class DepthFirstWorker {
   }
 
  private:
-  /// Returns false on an error.
-  bool run_path(uint64_t index) {
-    PathState path;
-    Ray ray = worker_.begin_path(index, 0, path);
-    if (!travel(ray)) return false;
-    worker_.finish_ray(ray, path);
-    while ((path.flags & kPathGoesOn) != 0 && path.hit.valid()) {
-      if (!worker_.take_in_hand(path.hit.treelet)) return false;
-      Ray rays[2];
-      const uint32_t count = worker_.shade(0, path, rays);
-      if (context_.ended.load(std::memory_order_relaxed)) return false;
-      for (uint32_t i = 0; i < count; ++i) {
-        if (!travel(rays[i])) return false;
-        worker_.finish_ray(rays[i], path);
+  /// A path under way. Its rays travel one after the other.
+  struct Path {
+    PathState state;
+    Ray rays[2];
+    uint32_t ray_count = 0;
+  };
+
+  void run_paths(const SampleRange& samples) {
+    uint64_t next = samples.first;
+    for (uint32_t i = 0; i < path_count_ && next < samples.last; ++i) begin(i, next++);
+    const auto decide = [&](uint32_t slot, const GroupRay& member, TreeletId treelet) -> const std::byte* {
+      if (treelet != kNoIndex) return pin(slot, member, treelet);
+      worker_.count_leaving(member, kNoIndex);
+      Path& path = paths_[path_index_of(member.ray)];
+      pins_[slot].reset();
+      worker_.finish_ray(member.ray, path.state);
+      ready_[ready_count_++] = path_index_of(member.ray);
+      return nullptr;
+    };
+    while (group_.size() > 0 && !context_.ended.load(std::memory_order_relaxed)) {
+      worker_.step(group_, decide);
+      while (ready_count_ > 0) {
+        const uint32_t index = ready_[--ready_count_];
+        if (!go_on(index) && next < samples.last) begin(index, next++);
       }
     }
-    if ((path.flags & kPathGoesOn) != 0) worker_.shade_miss(path);
-    worker_.end_path(path);
+    if (group_.size() > 0) drop_rays();
+  }
+
+  void begin(uint32_t index, uint64_t sample) {
+    Path& path = paths_[index];
+    path.ray_count = 0;
+    group_.add(worker_.begin_path(sample, index, path.state), nullptr);
+  }
+
+  /// A ray of the path has come home: sends the next one out, shading first where none is left. False: the path is over.
+  bool go_on(uint32_t index) {
+    Path& path = paths_[index];
+    if (path.ray_count == 0 && !shade(index, path)) return false;
+    if (path.ray_count == 0) {
+      worker_.end_path(path.state);
+      return false;
+    }
+    group_.add(path.rays[--path.ray_count], nullptr);
     return true;
   }
 
-  /// Traces the ray through every treelet on its way.
-  bool travel(Ray& ray) {
-    worker_.begin_ray();
-    TreeletId treelet = worker_.next_treelet(ray);
-    while (treelet != kNoIndex) {
-      if (!worker_.take_in_hand(treelet)) return false;
-      worker_.trace(ray);
-      const TreeletId before = treelet;
-      treelet = worker_.next_treelet(ray);
-      if (treelet != kNoIndex && treelet != before) ++worker_.ray_counters(ray).ray_exits_count;
+  /// Returns false on an error.
+  bool shade(uint32_t index, Path& path) {
+    PathState& state = path.state;
+    if ((state.flags & kPathGoesOn) == 0) return true;
+    if (!state.hit.valid()) {
+      worker_.shade_miss(state);
+      return true;
     }
-    return true;
+    if (!worker_.take_in_hand(state.hit.treelet)) return false;
+    path.ray_count = worker_.shade(index, state, path.rays);
+    if (path.ray_count == 2) std::swap(path.rays[0], path.rays[1]);  // the shadow ray first
+    worker_.let_go();  // the cache may have room for one page a thread
+    return !context_.ended.load(std::memory_order_relaxed);
+  }
+
+  /// The page of the ray's next treelet, held until the ray leaves it; none on an error.
+  const std::byte* pin(uint32_t slot, const GroupRay& member, TreeletId treelet) {
+    if (treelets_[slot] == treelet && pins_[slot]) return pins_[slot].bytes().data();
+    if (member.traced) ++worker_.ray_counters(member.ray).ray_exits_count;
+    pins_[slot].reset();
+    pins_[slot] = worker_.pin(treelet);
+    treelets_[slot] = treelet;
+    return pins_[slot] ? pins_[slot].bytes().data() : nullptr;
+  }
+
+  void drop_rays() {
+    group_.clear();
+    for (PagePin& pin : pins_) pin.reset();
+    ready_count_ = 0;
   }
 
   RenderContext& context_;
   RenderWorker worker_;
+  uint32_t path_count_;
+  RayGroup group_;
+  PagePin pins_[RayGroup::kCapacity];  ///< by slot of the group
+  TreeletId treelets_[RayGroup::kCapacity] = {};
+  Path paths_[kMaxPaths];
+  uint32_t ready_[kMaxPaths];  ///< paths whose ray has come home in this step
+  uint32_t ready_count_ = 0;
 };
 
 }  // namespace
 
 void render_depth_first(RenderContext& context) {
-  run_on_threads(context, [&] { DepthFirstWorker(context).run(); });
+  run_on_threads(context, [&] { std::make_unique<DepthFirstWorker>(context)->run(); });
 }
 
 }  // namespace shoal

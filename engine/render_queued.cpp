@@ -59,16 +59,18 @@ class QueuedWorker {
     uint32_t path = kNoIndex;
     const uint32_t taken = paths_.take_free(wanted, &path);
     const SampleRange samples = context_.begin_samples(taken);
-    for (uint32_t i = 0; i < taken; ++i) {
+    uint32_t i = 0;
+    travel([&] {
+      if (i == samples.size()) return false;
       const uint32_t current = path;
       path = paths_.state(current).next_free;
-      if (i >= samples.size()) {
-        paths_.give_back(current);
-        continue;
-      }
-      rays_[0] = worker_.begin_path(samples.first + i, current, paths_.state(current));
-      ray_count_ = 1;
-      handle_rays();
+      fresh(worker_.begin_path(samples.first + i++, current, paths_.state(current)));
+      return true;
+    });
+    for (; i < taken; ++i) {
+      const uint32_t current = path;
+      path = paths_.state(current).next_free;
+      paths_.give_back(current);
     }
   }
 
@@ -77,60 +79,66 @@ class QueuedWorker {
     uint32_t path = paths_.to_shade.take(treelet);
     RayBatch batch = paths_.rays.take(treelet);
     if (!worker_.take_in_hand(treelet) || (path != kNoIndex && !worker_.pin_attributes())) return;
-    while (path != kNoIndex && !context_.ended.load(std::memory_order_relaxed)) {
-      const uint32_t next = paths_.to_shade.next(path);
-      if (next != kNoIndex) paths_.prefetch(next);
-      ray_count_ = 0;
-      vertex_ready(path);
-      handle_rays();
-      path = next;
-    }
-    while (const uint32_t count = batch.next_block(block_)) {
-      worker_.counters().ray_moved_bytes += count * sizeof(Ray);
-      for (uint32_t i = 0; i < count && !context_.ended.load(std::memory_order_relaxed); ++i) {
-        if (i + 1 < count) paths_.prefetch(path_index_of(block_.rays[i + 1]));
-        ++worker_.ray_counters(block_.rays[i]).rays_drained_count;
-        ray_count_ = 0;
-        cross_treelets(block_.rays[i]);
-        handle_rays();
+    uint32_t next = 0, count = 0;
+    travel([&] {
+      if (path != kNoIndex) {
+        const uint32_t current = path;
+        path = paths_.to_shade.next(path);
+        if (path != kNoIndex) paths_.prefetch(path);
+        vertex_ready(current);
+        return true;
       }
-    }
+      if (next == count) {
+        next = 0, count = batch.next_block(block_);
+        if (count == 0) return false;
+        worker_.counters().ray_moved_bytes += count * sizeof(Ray);
+      }
+      const Ray& ray = block_.rays[next++];
+      paths_.prefetch(path_index_of(ray));
+      ++worker_.ray_counters(ray).rays_drained_count;
+      group_.add(ray, worker_.page_in_hand());
+      return true;
+    });
     worker_.let_go();
   }
 
-  /// New rays of one path: at most two, each addressed and then traced here or queued.
-  void handle_rays() {
-    while (ray_count_ > 0) {
-      Ray ray = rays_[--ray_count_];
-      worker_.begin_ray();
-      route(ray, worker_.next_treelet(ray));
+  /// A ray that has no cursor yet.
+  void fresh(const Ray& ray) { fresh_[fresh_count_++] = ray; }
+
+  /// Keeps the group full of rays and moves it on until there are no more. `more` puts rays into the group, or fresh
+  /// ones aside; it returns false when it has none left.
+  template <class More>
+  void travel(const More& more) {
+    const auto decide = [this](uint32_t, GroupRay& member, TreeletId treelet) { return route(member, treelet); };
+    bool left = true;
+    while (!context_.ended.load(std::memory_order_relaxed)) {
+      while (!group_.full()) {
+        if (fresh_count_ > 0) {
+          group_.add(fresh_[--fresh_count_], nullptr);
+        } else if (!left || !(left = more())) {
+          break;
+        }
+      }
+      if (group_.size() == 0) break;
+      worker_.step(group_, decide);
     }
+    group_.clear(), fresh_count_ = 0;
   }
 
-  /// The ray stands on an entry of the treelet in hand.
-  void cross_treelets(Ray& ray) {
-    worker_.begin_ray();
-    worker_.trace(ray);
-    const TreeletId next = worker_.next_treelet(ray);
-    if (next != kNoIndex && next != worker_.in_hand()) ++worker_.ray_counters(ray).ray_exits_count;
-    route(ray, next);
-  }
-
-  /// Sends a ray on to `treelet`, through the treelet in hand at once, or notes its answer.
-  void route(Ray& ray, TreeletId treelet) {
-    while (treelet != kNoIndex && treelet == worker_.in_hand()) {
-      worker_.trace(ray);
-      treelet = worker_.next_treelet(ray);
-      if (treelet != kNoIndex && treelet != worker_.in_hand()) ++worker_.ray_counters(ray).ray_exits_count;
-    }
+  /// Sends a ray on to `treelet`: through the treelet in hand at once, into a queue, or its answer is noted.
+  const std::byte* route(const GroupRay& member, TreeletId treelet) {
+    if (treelet != kNoIndex && treelet == worker_.in_hand()) return worker_.page_in_hand();
+    const Ray& ray = member.ray;
+    worker_.count_leaving(member, treelet);
     if (treelet != kNoIndex) {
       ++worker_.ray_counters(ray).rays_queued_count;
       worker_.counters().ray_moved_bytes += sizeof(Ray);
       paths_.rays.push(treelet, ray);
-      return;
+      return nullptr;
     }
     const uint32_t path = path_index_of(ray);
     if (worker_.finish_ray(ray, paths_.state(path))) vertex_ready(path);
+    return nullptr;
   }
 
   /// Both rays of the vertex are home: the path ends, is shaded here, or waits for its treelet.
@@ -146,8 +154,10 @@ class QueuedWorker {
       paths_.to_shade.push(path.hit.treelet, path_index);
       return;
     }
-    ray_count_ = worker_.shade(path_index, path, rays_);
-    if (ray_count_ == 0) end(path_index);
+    Ray rays[2];
+    const uint32_t count = worker_.shade(path_index, path, rays);
+    for (uint32_t i = 0; i < count; ++i) fresh(rays[i]);
+    if (count == 0) end(path_index);
   }
 
   void end(uint32_t path_index) {
@@ -162,8 +172,11 @@ class QueuedWorker {
   UsualBatches& batches_;
   RenderWorker worker_;
   uint32_t admit_batch_;
-  Ray rays_[2];  ///< of the path being handled
-  uint32_t ray_count_ = 0;
+  RayGroup group_;
+  /// Waiting to join the group. While there are any, nothing else joins it: so they belong to the at most 64 paths that
+  /// had a ray in the group, each of which has at most two.
+  Ray fresh_[2 * RayGroup::kCapacity];
+  uint32_t fresh_count_ = 0;
   RayBlock block_;
 };
 

@@ -96,20 +96,11 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   return ray;
 }
 
-void RenderWorker::trace(Ray& ray) {
-  RayCounters& rays = ray_counters(ray);
-  const uint64_t nodes = trace_counters_.node_tests_count, triangles = trace_counters_.triangle_tests_count;
-  trace_treelet(geometry_.bytes(), context_.scene.top_tree.current(ray),
-                context_.scene.top_tree.instance(ray.instance), ray, ray_context_, trace_counters_);
-  rays.node_tests_count += trace_counters_.node_tests_count - nodes;
-  rays.triangle_tests_count += trace_counters_.triangle_tests_count - triangles;
-  ++counters_.treelet_visits_count;
-}
-
-TreeletId RenderWorker::next_treelet(Ray& ray) {
-  if (ray.any_hit() && ray.hit.valid()) return kNoIndex;
-  const uint32_t entry = context_.scene.top_tree.next(ray, ray_context_, ray_counters(ray).node_tests_count);
-  return entry == kNoIndex ? kNoIndex : context_.scene.top_tree.entry(entry).treelet;
+void RenderWorker::count_leaving(const GroupRay& member, TreeletId next) {
+  RayCounters& rays = ray_counters(member.ray);
+  rays.node_tests_count += member.node_tests;
+  rays.triangle_tests_count += member.triangle_tests;
+  if (member.traced && next != kNoIndex) ++rays.ray_exits_count;
 }
 
 bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
@@ -173,18 +164,23 @@ void RenderWorker::end_path(const PathState& path) {
   counters_.path_state_moved_bytes += sizeof(PathState);
 }
 
-bool RenderWorker::take_in_hand(TreeletId treelet) {
-  if (treelet == in_hand_) return true;
-  let_go();
+PagePin RenderWorker::pin(TreeletId treelet) {
   Result<PagePin> pin = context_.cache.pin(context_.scene.treelets[treelet].geometry, cache_counters_);
   if (!pin.ok()) {
     context_.fail(std::move(pin).error());
-    return false;
+    return {};
   }
-  geometry_ = std::move(pin).value();
-  in_hand_ = treelet;
   ++counters_.treelet_batches_count;
-  counters_.treelet_visit_bytes += geometry_.bytes().size();
+  counters_.treelet_visit_bytes += pin.value().bytes().size();
+  return std::move(pin).value();
+}
+
+bool RenderWorker::take_in_hand(TreeletId treelet) {
+  if (treelet == in_hand_) return true;
+  let_go();
+  geometry_ = pin(treelet);
+  if (!geometry_) return false;
+  in_hand_ = treelet;
   return true;
 }
 

@@ -8,10 +8,10 @@
 #include "engine/camera.h"
 #include "engine/film.h"
 #include "engine/path_ray.h"
+#include "engine/ray_group.h"
 #include "engine/render.h"
 #include "engine/sample_order.h"
 #include "io/page_cache.h"
-#include "treelets/ray_space.h"
 #include "treelets/trace_treelet.h"
 
 namespace shoal {
@@ -70,12 +70,13 @@ class RenderWorker {
   /// Begins sample `index` in `path`; returns its camera ray.
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
 
-  /// The calls of trace() and next_treelet() up to the next begin_ray() are about one ray.
-  void begin_ray() { ray_context_.reset(); }
-  /// Traces the ray through the treelet in hand. Requires: the cursor stands on an entry of that treelet.
-  void trace(Ray& ray);
-  /// Next treelet of the ray, or kNoIndex when its answer is known.
-  TreeletId next_treelet(Ray& ray);
+  /// Every ray of `group` goes on by one treelet; see RayGroup::step.
+  template <class Decide>
+  void step(RayGroup& group, const Decide& decide) {
+    counters_.treelet_visits_count += group.step(context_.scene.top_tree, trace_counters_, decide);
+  }
+  /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
+  void count_leaving(const GroupRay& member, TreeletId next);
 
   /// The ray's answer is known: notes it in its path. Returns true when it was the last ray of the vertex.
   bool finish_ray(const Ray& ray, PathState& path);
@@ -88,9 +89,13 @@ class RenderWorker {
   /// Adds the path to the film.
   void end_path(const PathState& path);
 
+  /// The page of a treelet, for one ray or a batch. Nothing on an error (context.ended is set).
+  PagePin pin(TreeletId treelet);
   /// Pins the treelet; the one before is let go. Returns false on an error (context.ended is set).
   bool take_in_hand(TreeletId treelet);
   TreeletId in_hand() const { return in_hand_; }
+  /// The page of the treelet in hand; none when there is no such treelet.
+  const std::byte* page_in_hand() const { return geometry_.bytes().data(); }
   void let_go();
   /// Pins the attributes of the treelet in hand. Returns false on an error (context.ended is set).
   bool pin_attributes();
@@ -111,7 +116,6 @@ class RenderWorker {
   RenderContext& context_;
   Shader shader_;
   PagePin geometry_, attributes_;
-  RayContext ray_context_;
   TreeletId in_hand_ = kNoIndex;
   TreeletId attributes_of_ = kNoIndex;
   RenderCounters counters_;

@@ -1,5 +1,6 @@
 // The ray-box test: three slabs (Kay & Kajiya 1986) with the ray widened by RaySpace::pad and the far results
-// enlarged by kFarScale (Ize 2013). Scalar form; the SIMD kernels do the same operations in the same order.
+// enlarged by kFarScale (Ize 2013). Scalar form: the test of a triangle's own box, and of nodes by the scalar traversal.
+// The SIMD kernels test nodes with fewer operations and a wider ray (ray_space.h).
 //
 // Monotone: every operation is a rounded monotone function of the planes. So if box A lies inside box B, then
 // t_near(B) <= t_near(A) and t_far(A) <= t_far(B) in the computed values, and what enters A enters B. A hit counts
@@ -21,12 +22,15 @@ struct BoxSpan {
 };
 
 inline BoxSpan cross_box(const RaySpace& ray, const float lo[3], const float hi[3]) {
+  constexpr float kMax = std::numeric_limits<float>::max();
   float near[3], far[3];
   for (int axis = 0; axis < 3; ++axis) {
     const float near_plane = ray.negative[axis] ? hi[axis] : lo[axis];
     const float far_plane = ray.negative[axis] ? lo[axis] : hi[axis];
-    near[axis] = (near_plane - ray.near_origin[axis]) * ray.inverse[axis];
-    far[axis] = (far_plane - ray.far_origin[axis]) * ray.far_inverse[axis];
+    const float toward = ray.negative[axis] ? -ray.pad : ray.pad;
+    const float far_inverse = std::min(std::max(ray.inverse[axis] * kFarScale, -kMax), kMax);
+    near[axis] = (near_plane - (ray.origin[axis] + toward)) * ray.inverse[axis];
+    far[axis] = (far_plane - (ray.origin[axis] - toward)) * far_inverse;
   }
   BoxSpan span;
   span.t_near = std::max(0.0f, std::max(near[2], std::max(near[1], near[0])));

@@ -16,6 +16,7 @@
 #include "treelets/gather_leaf.h"
 #include "treelets/pack_attributes.h"
 #include "treelets/pack_treelet.h"
+#include "treelets/treelet_view.h"
 #include "treelets/triangle_refs.h"
 
 namespace shoal {
@@ -143,7 +144,9 @@ void measure_leaves(const TriangleSoup& soup, std::span<uint32_t> order, std::sp
     std::sort(triangles.begin(), triangles.end());
     LeafVertices leaf;
     gather_leaf(soup.positions, triangles, leaf);
-    node.bytes = leaf_bytes(leaf.triangle_count, leaf.vertex_count) + leaf.triangle_count * 4;
+    uint32_t primitives[kMaxLeafTriangles];
+    for (size_t t = 0; t < triangles.size(); ++t) primitives[t] = soup.primitive[triangles[t]];
+    node.bytes = LeafParts::of(plan_leaf(leaf, {primitives, triangles.size()})).padded_bytes();
   });
   for (size_t i = tree.size(); i-- > 0;) {  // children come after their parent
     if (tree[i].leaf()) continue;

@@ -27,25 +27,29 @@ Status check_header(std::span<const std::byte> page) {
     return corrupt(fmt::format("magic: expected {:#x}, found {:#x}", kTreeletMagic, h.magic));
   const uint64_t nodes_end = sizeof(TreeletHeader) + uint64_t{h.node_count} * sizeof(QuantizedNode);
   const uint64_t leaves_end = uint64_t{h.leaves_offset} + h.leaves_bytes;
-  const uint64_t primitives_end = uint64_t{h.primitives_offset} + uint64_t{4} * h.triangle_count;
   if (h.leaves_offset % 4 != 0 || h.leaves_offset < nodes_end || leaves_end > page.size()) {
     return corrupt(fmt::format("leaves at {}, {} bytes, do not fit between {} nodes and the end at {}",
                                h.leaves_offset, h.leaves_bytes, h.node_count, page.size()));
-  }
-  if (h.primitives_offset % 4 != 0 || h.primitives_offset < leaves_end || primitives_end > page.size()) {
-    return corrupt(
-        fmt::format("{} primitive ids at {} do not fit between the leaves' end at {} and the page's at {}",
-                    h.triangle_count, h.primitives_offset, leaves_end, page.size()));
   }
   if (h.leaves_bytes / 4 >= 1u << 27)
     return corrupt(fmt::format("{} bytes of leaves are too many", h.leaves_bytes));
   if (h.coverage_offset == 0) return {};
   const uint64_t coverage_end = uint64_t{h.coverage_offset} + uint64_t{4} * h.triangle_count +
                                 uint64_t{h.coverage_record_count} * sizeof(CoverageRecord) + h.coverage_texel_bytes;
-  if (h.coverage_offset % 4 != 0 || h.coverage_offset < primitives_end || coverage_end > page.size()) {
-    return corrupt(
-        fmt::format("coverage at {} does not fit between the primitive ids' end at {} and the page's at {}",
-                    h.coverage_offset, primitives_end, page.size()));
+  if (h.coverage_offset % 4 != 0 || h.coverage_offset < leaves_end || coverage_end > page.size()) {
+    return corrupt(fmt::format("coverage at {} does not fit between the leaves' end at {} and the page's at {}",
+                               h.coverage_offset, leaves_end, page.size()));
+  }
+  return {};
+}
+
+Status check_positions(const LeafView& leaf, uint64_t at) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    for (uint32_t vertex = 0; vertex < leaf.vertex_count; ++vertex) {
+      if (!std::isfinite(leaf.coordinate(axis, vertex))) {
+        return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
+      }
+    }
   }
   return {};
 }
@@ -61,13 +65,16 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
   if (triangles < 1 || triangles > kMaxLeafTriangles || vertices < 1 || vertices > kMaxLeafVertices) {
     return corrupt(fmt::format("leaf at {} has {} triangles and {} vertices", at, triangles, vertices));
   }
-  if (at + leaf_bytes(triangles, vertices) > h.leaves_bytes) {
+  const uint8_t flags = leaf.header().flags;
+  if ((flags & ~(kLeafHighMask | kLeafFloats | kLeafCoverage)) != 0 ||
+      (leaf.has_floats() && (flags & kLeafHighMask) != 0) || leaf.header().primitive_bytes > sizeof(uint32_t)) {
+    return corrupt(fmt::format("leaf at {} has flags {:#x} and {} bytes a primitive id", at, flags,
+                               leaf.header().primitive_bytes));
+  }
+  if (at + leaf.bytes() > h.leaves_bytes) {
     return corrupt(fmt::format("leaf at {} ends past the {} bytes of leaves", at, h.leaves_bytes));
   }
-  for (uint32_t i = 0; i < 3 * vertices; ++i) {
-    if (!std::isfinite(leaf.axis(0)[i]))
-      return corrupt(fmt::format("leaf at {} has a position that is not finite", at));
-  }
+  SHOAL_RETURN_IF_ERROR(check_positions(leaf, at));
   for (uint32_t i = 0; i < 3 * triangles; ++i) {
     if (leaf.corner(0)[i] >= vertices) {
       return corrupt(fmt::format("leaf at {} names vertex {} of {}", at, leaf.corner(0)[i], vertices));
@@ -77,7 +84,7 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
     return corrupt(fmt::format("leaf at {} has ordinals from {}, the page {} triangles", at,
                                leaf.header().first_ordinal, h.triangle_count));
   }
-  if (leaf.header().has_coverage && h.coverage_offset == 0) {
+  if (leaf.has_coverage() && h.coverage_offset == 0) {
     return corrupt(fmt::format("leaf at {} has coverage, the page none", at));
   }
   return {};
@@ -168,6 +175,7 @@ Status check_treelet(std::span<const std::byte> page) {
 
 Status check_root(std::span<const std::byte> page, uint32_t root) {
   const TreeletView treelet(page);
+  if (root == kEmptyRef) return corrupt("an empty root");
   if (is_leaf(root)) return check_leaf(treelet, leaf_offset(root));
   if (root >= treelet.header->node_count) {
     return corrupt(fmt::format("root {} of {} nodes", root, treelet.header->node_count));

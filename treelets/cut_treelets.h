@@ -26,7 +26,7 @@ struct TreeletCut {
   }
 };
 
-/// Requires: BinaryNode::bytes holds the packed bytes of the leaves below (with their primitive ids, without
+/// Requires: BinaryNode::bytes holds the packed bytes of the leaves below (without
 /// coverage), `starts` are the subtrees to cut, in depth-first order; `order[first + i]` is the i-th triangle of a node.
 TreeletCut cut_treelets(std::span<const BinaryNode> tree, std::span<const uint32_t> starts, const WidePlan& plan,
                         std::span<const uint32_t> order, const CoverageCropper& cropper, uint32_t treelet_bytes);

@@ -14,7 +14,7 @@ TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot) {
   triangle.p1 = leaf.position(i, 1);
   triangle.p2 = leaf.position(i, 2);
   triangle.ordinal = leaf.header().first_ordinal + i;
-  triangle.primitive = treelet.primitives()[triangle.ordinal];
+  triangle.primitive = leaf.primitive(i);
   triangle.material = treelet.header->uniform_material;
   return triangle;
 }

@@ -29,18 +29,21 @@ inline bool passes_coverage(const TreeletView& treelet, const Ray& ray, const Tr
 
 /// Tests triangle `i` of the leaf at `offset`. Returns true when an any-hit ray is done.
 inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t i,
-                          const RaySpace& space, const TreeletEntry& entry, Ray& ray, TraceCounters& counters) {
+                          const RaySpace& space, const TraceJob& job, TraceCounters& counters) {
+  Ray& ray = *job.ray;
   TriangleHit hit;
   if (!intersect_triangle(space, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), ray.t, hit)) {
     return false;
   }
   const bool any_hit = ray.any_hit();
   if (any_hit && !(hit.t < ray.t)) return false;
-  const uint32_t ordinal = leaf.header().first_ordinal + i;
-  const uint32_t primitive = treelet.primitives()[ordinal];
+  const uint32_t primitive = leaf.primitive(i);
   if (!any_hit && !comes_before(ray, hit.t, ray.instance, primitive)) return false;
-  if (leaf.header().has_coverage && !passes_coverage(treelet, ray, hit, ordinal, primitive, counters)) return false;
-  ray.hit = {ray.instance, primitive, entry.treelet, offset << 4 | i};
+  if (leaf.has_coverage() &&
+      !passes_coverage(treelet, ray, hit, leaf.header().first_ordinal + i, primitive, counters)) {
+    return false;
+  }
+  ray.hit = {ray.instance, primitive, job.entry.treelet, offset << 4 | i};
   if (any_hit) return true;
   ray.t = hit.t;
   return false;

@@ -28,21 +28,18 @@ class Packer {
     header.leaves_offset = static_cast<uint32_t>(sizeof header + nodes_.size() * sizeof(QuantizedNode));
     header.leaves_bytes = static_cast<uint32_t>(leaves_.size());
     header.triangle_count = static_cast<uint32_t>(out_.triangles.size());
-    header.primitives_offset = header.leaves_offset + header.leaves_bytes;
     header.uniform_material = uniform_material();
-    const uint32_t primitives_bytes = header.triangle_count * static_cast<uint32_t>(sizeof(uint32_t));
     if (!records_.empty()) {
-      header.coverage_offset = header.primitives_offset + primitives_bytes;
+      header.coverage_offset = header.leaves_offset + header.leaves_bytes;
       header.coverage_record_count = static_cast<uint32_t>(records_.size());
       header.coverage_texel_bytes = static_cast<uint32_t>(crops_.texel_bytes());
     }
     std::vector<std::byte>& page = out_.geometry;
-    page.reserve(header.primitives_offset + 2 * primitives_bytes + records_.size() * sizeof(CoverageRecord) +
-                 crops_.texel_bytes());
+    page.reserve(header.leaves_offset + header.leaves_bytes + record_of_.size() * sizeof(uint32_t) +
+                 records_.size() * sizeof(CoverageRecord) + crops_.texel_bytes());
     append(page, std::span<const TreeletHeader>(&header, 1));
     append<QuantizedNode>(page, nodes_);
     append<std::byte>(page, leaves_);
-    for (const uint32_t triangle : out_.triangles) append<uint32_t>(page, {&soup_.primitive[triangle], 1});
     return records_.empty() ? Status() : append_coverage();
   }
 
@@ -72,21 +69,17 @@ class Packer {
     gather_leaf(soup_.positions, triangles, leaf_);
     out_.leaf_area += half_area(node);
     ++out_.leaves_count;
-    LeafHeader header{};
-    header.triangle_count = static_cast<uint8_t>(leaf_.triangle_count);
-    header.vertex_count = static_cast<uint8_t>(leaf_.vertex_count);
+    primitives_.clear();
+    for (const uint32_t triangle : triangles) primitives_.push_back(soup_.primitive[triangle]);
+    LeafHeader header = plan_leaf(leaf_, primitives_);
     header.first_ordinal = static_cast<uint32_t>(out_.triangles.size());
-    for (const uint32_t triangle : triangles) header.has_coverage |= add_triangle(triangle);
-
+    for (const uint32_t triangle : triangles) header.flags |= add_triangle(triangle);
     const size_t offset = leaves_.size();
-    append(leaves_, std::span<const LeafHeader>(&header, 1));
-    for (const auto& axis : leaf_.bits) append(leaves_, std::span<const uint32_t>(axis, leaf_.vertex_count));
-    for (const auto& corner : leaf_.index) append(leaves_, std::span<const uint8_t>(corner, leaf_.triangle_count));
-    leaves_.resize(offset + leaf_bytes(leaf_.triangle_count, leaf_.vertex_count));
+    append_leaf(leaf_, header, primitives_, leaves_);
     return kLeafBit | static_cast<NodeRef>(offset / 4);
   }
 
-  // Returns 1 when the triangle has a coverage record.
+  // Returns kLeafCoverage when the triangle has a coverage record.
   uint8_t add_triangle(uint32_t triangle) {
     out_.triangles.push_back(triangle);
     if (!cropper_.any()) return 0;
@@ -95,7 +88,7 @@ class Packer {
     if (!plan) return 0;
     if (plan->crop.width != 0) plan->record.texel_offset = crops_.add(plan->crop);
     records_.push_back(plan->record);
-    return 1;
+    return kLeafCoverage;
   }
 
   uint32_t uniform_material() const {
@@ -132,6 +125,7 @@ class Packer {
   std::vector<CoverageRecord> records_;
   CropSet crops_;
   LeafVertices leaf_;
+  std::vector<uint32_t> primitives_;  ///< of the leaf
 };
 
 }  // namespace

@@ -12,6 +12,15 @@
 // So boxes widened by 10 u R hold every hit that the triangle test accepts; kObjectPad = 12 u also covers the
 // rounding of the pad itself and the terms of order u^2. FLT_MIN is added for products that underflow.
 //
+// The boxes of nodes are tested with fewer operations (treelets/box_kernel-inl.h): plane * slope + bias, the grid of a
+// quantised node multiplied out. What enters the triangle's own box (box_test.h) must enter every node above it, so the
+// node's ray is wider by the errors of both, as positions: of the node 4 u R (bias, its sum with the node's
+// origin, the last sum, the grid plane that the packer evaluated in float), 1 u R of the enlargement of t_far; of
+// the triangle's box 2 u R and 2 u R of its enlargement; 2 u R of both moved origins: kNodePad = 12 u more. Slopes are
+// inverse directions, held below 2^60 times the least of them: a box that the ray touches is left after at most
+// 2 R along the longest axis, which a wider one bounds by 12 u R 2^60 along any other.
+// Rays whose products could overflow or lose bits are `extreme` and go through box_test.h instead.
+//
 // The tree over instances is tested in world space, the hit was decided in object space. With M the object to world
 // matrix, L its linear part, T its translation, N the stored inverse, K >= ||L| |N|| (Instance::transform_error)
 // and W <= E the extent of the instance in the world, E = |T| + |L| B (row sums), the world point of a hit errs by
@@ -34,36 +43,65 @@ namespace shoal {
 inline constexpr float kRoundingUnit = 0x1p-24f;
 inline constexpr float kObjectPad = 12 * kRoundingUnit;
 inline constexpr float kWorldPad = 40 * kRoundingUnit;
+inline constexpr float kNodePad = 12 * kRoundingUnit;
 
 /// 1 + 2 gamma(3) = 1 + 6u (1 + O(u)) (Ize 2013, "Robust BVH Ray Traversal", section 3), and one more rounding in
 /// far_inverse: 7u, rounded up to a float.
 inline constexpr float kFarScale = 0x1.000008p0f;
 
-struct RaySpace {
-  float origin[3];
-  float direction[3];
-  float inverse[3];        ///< 1 / direction, clamped to +-FLT_MAX, so that (plane - origin) * inverse is never NaN
-  float far_inverse[3];    ///< inverse * kFarScale, clamped alike
-  float near_origin[3];    ///< origin moved by pad so that near planes come earlier
-  float far_origin[3];     ///< origin moved by pad so that far planes come later
-  uint32_t negative[3];    ///< 1: the ray runs towards smaller coordinates: hi is the near plane
+struct alignas(16) RaySpace {
+  float origin[4];         ///< the fourth of each is unused
+  float direction[4];
+  float inverse[4];        ///< 1 / direction, clamped to +-FLT_MAX, so that (plane - origin) * inverse is never NaN
+  float slope[4];          ///< of node tests: t = plane * slope + bias
+  float near_bias[4];      ///< -(origin moved so that near planes come earlier) * slope
+  float far_bias[4];       ///< -(origin moved so that far planes come later) * slope
+  uint32_t negative[4];    ///< 1: the ray runs towards smaller coordinates: hi is the near plane
   uint32_t kx, ky, kz;     ///< kz: axis along which the direction is longest
   float shear_x, shear_y;  ///< d[kx] / d[kz], d[ky] / d[kz]
-  float pad;
+  float pad;               ///< of box_test.h
+  bool extreme;            ///< slope and biases must not be used
 };
 
 inline float max_abs(const float v[3]) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
 
-inline void set_pad(RaySpace& ray, float pad) {
-  ray.pad = pad;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float toward = ray.negative[axis] ? -pad : pad;
-    ray.near_origin[axis] = ray.origin[axis] + toward;
-    ray.far_origin[axis] = ray.origin[axis] - toward;
-  }
+/// Slopes are held below kMaxSlope times the least.
+inline constexpr float kMaxSlope = 0x1p60f;
+inline bool is_extreme(float largest_slope, float least_slope, float reach) {
+  return !(largest_slope * reach < 0x1p100f && least_slope > 1 / kMaxSlope && reach > 0x1p-60f);
 }
 
-/// Everything but the pad.
+/// Sets the pads. `reach`: R above, max|origin| and the extent of what is traced.
+inline void set_pad(RaySpace& ray, float pad, float reach) {
+  ray.pad = pad;
+  const float least = std::abs(ray.inverse[ray.kz]), most = least * kMaxSlope;
+  const float node_pad = pad + kNodePad * reach;
+  float largest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float slope = std::min(std::max(ray.inverse[axis], -most), most);
+    const float toward = ray.negative[axis] != 0 ? -node_pad : node_pad;
+    ray.slope[axis] = slope;
+    ray.near_bias[axis] = -((ray.origin[axis] + toward) * slope);
+    ray.far_bias[axis] = -((ray.origin[axis] - toward) * slope);
+    largest = std::max(largest, std::abs(slope));
+  }
+  ray.slope[3] = ray.near_bias[3] = ray.far_bias[3] = 0;
+  ray.extreme = is_extreme(largest, least, reach);
+}
+
+/// Sets kx, ky, kz and the shear.
+inline void set_axes(const Vec3& direction, RaySpace& ray) {
+  const float ax = std::abs(direction.x), ay = std::abs(direction.y), az = std::abs(direction.z);
+  const uint32_t x_longest = (ax > ay) & (ax > az), y_longest = !(ax > ay) & (ay > az);
+  ray.kz = 2 - 2 * x_longest - y_longest;
+  ray.kx = ray.kz == 2 ? 0 : ray.kz + 1;
+  ray.ky = ray.kx == 2 ? 0 : ray.kx + 1;
+  const float longest = direction[static_cast<int>(ray.kz)];
+  ray.shear_x = direction[static_cast<int>(ray.kx)] / longest;
+  ray.shear_y = direction[static_cast<int>(ray.ky)] / longest;
+}
+
+/// Everything but what set_pad() sets.
 inline RaySpace prepare_ray(const Vec3& origin, const Vec3& direction) {
   constexpr float kMax = std::numeric_limits<float>::max();
   RaySpace ray;
@@ -71,15 +109,11 @@ inline RaySpace prepare_ray(const Vec3& origin, const Vec3& direction) {
     ray.origin[axis] = origin[axis];
     ray.direction[axis] = direction[axis];
     ray.inverse[axis] = std::min(std::max(1.0f / direction[axis], -kMax), kMax);
-    ray.far_inverse[axis] = std::min(std::max(ray.inverse[axis] * kFarScale, -kMax), kMax);
     ray.negative[axis] = std::signbit(direction[axis]) ? 1 : 0;
   }
-  const float ax = std::abs(direction.x), ay = std::abs(direction.y), az = std::abs(direction.z);
-  ray.kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
-  ray.kx = ray.kz == 2 ? 0 : ray.kz + 1;
-  ray.ky = ray.kx == 2 ? 0 : ray.kx + 1;
-  ray.shear_x = ray.direction[ray.kx] / ray.direction[ray.kz];
-  ray.shear_y = ray.direction[ray.ky] / ray.direction[ray.kz];
+  ray.origin[3] = ray.direction[3] = ray.inverse[3] = 0;
+  ray.negative[3] = 0;
+  set_axes(direction, ray);
   return ray;
 }
 
@@ -93,7 +127,8 @@ inline RaySpace to_object_space(const Ray& ray, const Instance& instance) {
   RaySpace object = instance.identity ? prepare_ray(ray.origin, ray.direction)
                                       : prepare_ray(instance.world_to_object.point(ray.origin),
                                                     instance.world_to_object.vector(ray.direction));
-  set_pad(object, object_pad(object, instance.max_abs_coordinate));
+  set_pad(object, object_pad(object, instance.max_abs_coordinate),
+          max_abs(object.origin) + instance.max_abs_coordinate);
   return object;
 }
 

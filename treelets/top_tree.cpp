@@ -5,13 +5,19 @@
 #include <hwy/highway.h>
 // clang-format on
 
+#include <hwy/cache_control.h>
+
 #include "treelets/box_kernel-inl.h"
 #include "treelets/ray_space.h"
+#include "treelets/space_kernel-inl.h"
 #include "treelets/top_tree.h"
 
 #ifndef SHOAL_TREELETS_TOP_TREE_TABLES
 #define SHOAL_TREELETS_TOP_TREE_TABLES
 namespace shoal {
+/// Rays walked in turn: while one waits for memory or a result the others go on.
+inline constexpr uint32_t kWalkLanes = 16;
+
 /// What next() needs of a TopTree, for the kernel of each target.
 struct TopTreeTables {
   const TopNode* nodes;
@@ -27,7 +33,7 @@ inline const RaySpace& space_of(const TopTreeTables& tree, const Ray& ray, RayCo
   if (!context.world_ready) {
     context.world = prepare_ray(ray.origin, ray.direction);
     const float reach = max_abs(context.world.origin) + tree.world_extent;
-    set_pad(context.world, tree.world_pad_scale * reach + std::numeric_limits<float>::min());
+    set_pad(context.world, tree.world_pad_scale * reach + std::numeric_limits<float>::min(), reach);
     context.world_ready = true;
   }
   return context.world;
@@ -92,6 +98,19 @@ inline bool descend(const TopTreeTables& tree, Ray& ray, RayContext& context, To
   }
   return false;
 }
+
+/// What the vector form does, by box_test.h.
+inline uint32_t cross_extreme(const RaySpace& ray, const TopNode& node, float t, uint32_t keys[8]) {
+  uint32_t mask = 0;
+  for (uint32_t slot = 0; slot < 8; ++slot) {
+    const float lo[3] = {node.lo[0][slot], node.lo[1][slot], node.lo[2][slot]};
+    const float hi[3] = {node.hi[0][slot], node.hi[1][slot], node.hi[2][slot]};
+    const BoxSpan span = cross_box(ray, lo, hi);
+    keys[slot] = entry_key(span.t_near, slot);
+    if (span.entered(t)) mask |= 1u << slot;
+  }
+  return mask;
+}
 }  // namespace shoal
 #endif
 
@@ -99,50 +118,158 @@ HWY_BEFORE_NAMESPACE();
 namespace shoal {
 namespace HWY_NAMESPACE {
 
-HWY_INLINE uint32_t cross_top_node(const RaySpace& ray, const TopNode& node, float t, uint32_t keys[8]) {
-  const auto plane = [&](uint32_t side, uint32_t axis, size_t first)
-                         HWY_ATTR { return hn::Load(F8(), (side ? node.hi : node.lo)[axis] + first); };
-  return cross_boxes(ray, t, plane, keys);
-}
+/// The next child to enter of a node.
+struct ChosenChild {
+  uint32_t key;  ///< entry_key(); kNoIndex: none
+  bool more;     ///< others are left behind it
+};
 
-/// The key of the next child to enter: the smallest of `mask`, above `after` when the node is met again; kNoIndex:
-/// none. Sets `more` to whether others are left behind it.
-HWY_INLINE uint32_t choose_child(const uint32_t keys[8], uint32_t mask, bool again, uint32_t after, bool& more) {
+/// The smallest of the keys in `mask` that lie above `after`; as signed integers, so that -1 lies below all.
+HWY_INLINE ChosenChild choose_child(const uint32_t keys[8], uint32_t mask, int32_t after) {
   uint32_t best = kNoIndex, count = 0;
   for (; mask != 0; mask &= mask - 1) {
     const uint32_t key = keys[std::countr_zero(mask)];
-    if (again && key <= after) continue;
+    if (static_cast<int32_t>(key) <= after) continue;
     best = std::min(best, key);
     ++count;
   }
-  more = count > 1;
-  return best;
+  return {best, count > 1};
 }
 
-uint32_t next_entry(const TopTreeTables& tree, Ray& ray, RayContext& context, uint64_t& node_tests) {
-  TopPlace place = place_of_cursor(tree, ray, context);
-  for (;;) {
-    const TopNode& node = tree.nodes[place.node];
-    const uint32_t level = place.base + node.level;
-    const uint32_t bit = level < tree.more_levels ? 1u << level : 0;
-    uint32_t key = kNoIndex;
-    if (!place.again || bit == 0 || (ray.more & bit) != 0) {
-      ++node_tests;
-      uint32_t keys[8];
-      const uint32_t mask = cross_top_node(*place.space, node, ray.t, keys);
-      bool more;
-      key = choose_child(keys, mask, place.again, keys[place.slot], more);
-      ray.more = more ? ray.more | bit : ray.more & ~bit;
+HWY_INLINE BoxLanes cross_top_lanes(const RaySpace& ray, const TopNode& node, float t, size_t first) {
+  const auto plane = [&](uint32_t side, uint32_t axis)
+                         HWY_ATTR { return hn::Load(F8(), (side != 0 ? node.hi : node.lo)[axis] + first); };
+  return cross_boxes(ray, t, ray.slope, ray.near_bias, ray.far_bias, first, plane);
+}
+
+/// Tests the children of a node: the nearest that the ray enters, behind the one in place.slot if it is met again.
+HWY_INLINE ChosenChild cross_top_node(const TopNode& node, const TopPlace& place, float t) {
+  const RaySpace& ray = *place.space;
+  HWY_ALIGN uint32_t keys[8];
+  if (HWY_UNLIKELY(ray.extreme)) {
+    const uint32_t mask = cross_extreme(ray, node, t, keys);
+    return choose_child(keys, mask, place.again ? static_cast<int32_t>(keys[place.slot]) : -1);
+  }
+#if HWY_MAX_BYTES >= 32
+  const U8 u;
+  const hn::RebindToSigned<U8> i;
+  const BoxLanes boxes = cross_top_lanes(ray, node, t, 0);
+  hn::Store(boxes.key, u, keys);
+  const int32_t after = place.again ? static_cast<int32_t>(keys[place.slot]) : -1;
+  const auto left =
+      hn::And(hn::RebindMask(i, boxes.entered), hn::Gt(hn::BitCast(i, boxes.key), hn::Set(i, after)));
+  const auto least = hn::MinOfLanes(u, hn::IfThenElse(hn::RebindMask(u, left), boxes.key, hn::Set(u, kNoIndex)));
+  return {hn::GetLane(least), hn::CountTrue(i, left) > 1};
+#else
+  uint32_t mask = 0;
+  for (size_t first = 0; first < 8; first += hn::Lanes(F8())) {
+    const BoxLanes boxes = cross_top_lanes(ray, node, t, first);
+    hn::StoreU(boxes.key, U8(), keys + first);
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(F8(), boxes.entered, bits);
+    mask |= uint32_t{bits[0]} << first;
+  }
+  return choose_child(keys, mask, place.again ? static_cast<int32_t>(keys[place.slot]) : -1);
+#endif
+}
+
+/// A ray on its way through the top tree.
+struct WalkLane {
+  NextJob* job;
+  TopPlace place;
+  ChosenChild chosen;
+  uint32_t bit;  ///< of Ray::more for the level of the node
+};
+
+class Walker {
+ public:
+  Walker(const TopTreeTables& tree, std::span<NextJob> jobs) : tree_(tree), jobs_(jobs) {}
+
+  HWY_INLINE void run() {
+    for (uint32_t lane = 0; lane < kWalkLanes && next_job_ < jobs_.size(); ++lane) {
+      if (start(lanes_[active_])) ++active_;
     }
-    if (key == kNoIndex) {
-      if (!climb(tree, ray, context, place)) break;
-    } else if (descend(tree, ray, context, place, key & 7)) {
-      return node.child[key & 7];
+    while (active_ > 0) {
+      for (uint32_t i = 0; i < active_; ++i) {
+        WalkLane& lane = lanes_[i];
+        lane.chosen = cross_top_node(tree_.nodes[lane.place.node], lane.place, lane.job->ray->t);
+      }
+      for (uint32_t i = 0; i < active_;) {
+        if (go_on(lanes_[i]) || start(lanes_[i])) {
+          ++i;
+        } else if (--active_ != i) {
+          lanes_[i] = lanes_[active_];
+        }
+      }
     }
   }
-  ray.cursor = kNoIndex, ray.instance = kNoIndex, ray.more = 0;
-  return kNoIndex;
-}
+
+ private:
+  /// Puts the next job into the lane; false when none is left that needs a test.
+  HWY_INLINE bool start(WalkLane& lane) {
+    while (next_job_ < jobs_.size()) {
+      lane.job = &jobs_[next_job_++];
+      Ray& ray = *lane.job->ray;
+      RayContext& context = *lane.job->context;
+      if (tree_.single_identity && context.object_instance != 0) {
+        prepare_identity(ray, tree_.instances[0].max_abs_coordinate, context.object);
+        context.object_instance = 0;
+      }
+      lane.place = place_of_cursor(tree_, ray, context);
+      if (settle(lane)) return true;
+    }
+    return false;
+  }
+
+  /// From a node met again, up to the nearest that has children left; false at the end: the ray leaves the tree.
+  HWY_INLINE bool settle(WalkLane& lane) {
+    Ray& ray = *lane.job->ray;
+    for (;;) {
+      const TopNode& node = tree_.nodes[lane.place.node];
+      const uint32_t level = lane.place.base + node.level;
+      lane.bit = level < tree_.more_levels ? 1u << level : 0;
+      if (!lane.place.again || lane.bit == 0 || (ray.more & lane.bit) != 0) {
+        ++lane.job->node_tests;
+        return true;
+      }
+      if (!climb(tree_, ray, *lane.job->context, lane.place)) return leave(lane);
+    }
+  }
+
+  HWY_INLINE bool leave(WalkLane& lane) {
+    Ray& ray = *lane.job->ray;
+    ray.cursor = kNoIndex, ray.instance = kNoIndex, ray.more = 0;
+    lane.job->entry = kNoIndex;
+    return false;
+  }
+
+  /// After a test: to the next place; false when the ray has found its entry, or left.
+  HWY_INLINE bool go_on(WalkLane& lane) {
+    Ray& ray = *lane.job->ray;
+    RayContext& context = *lane.job->context;
+    const ChosenChild chosen = lane.chosen;
+    ray.more = chosen.more ? ray.more | lane.bit : ray.more & ~lane.bit;
+    if (chosen.key == kNoIndex) {
+      return climb(tree_, ray, context, lane.place) ? settle(lane) : leave(lane);
+    }
+    const TopNode& node = tree_.nodes[lane.place.node];
+    if (descend(tree_, ray, context, lane.place, chosen.key & 7)) {
+      lane.job->entry = node.child[chosen.key & 7];
+      return false;
+    }
+    const auto* below = reinterpret_cast<const std::byte*>(tree_.nodes + lane.place.node);
+    for (int line = 0; line < 4; ++line) hwy::Prefetch(below + 64 * line);
+    return settle(lane);
+  }
+
+  const TopTreeTables& tree_;
+  std::span<NextJob> jobs_;
+  size_t next_job_ = 0;
+  uint32_t active_ = 0;
+  WalkLane lanes_[kWalkLanes];
+};
+
+void next_entries(const TopTreeTables& tree, std::span<NextJob> jobs) { Walker(tree, jobs).run(); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
@@ -151,7 +278,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace shoal {
 
-HWY_EXPORT(next_entry);
+HWY_EXPORT(next_entries);
 
 namespace {
 
@@ -179,11 +306,21 @@ TopTree::TopTree(std::vector<TopNode> nodes, std::vector<TreeletEntry> entries, 
   single_identity_ = instances_.size() == 1 && instances_[0].identity != 0;
 }
 
-uint32_t TopTree::next(Ray& ray, RayContext& context, uint64_t& node_tests) const {
-  if (nodes_.empty()) return kNoIndex;
+void TopTree::next(std::span<NextJob> jobs) const {
+  if (nodes_.empty()) {
+    for (NextJob& job : jobs) job.entry = kNoIndex;
+    return;
+  }
   const TopTreeTables tables{nodes_.data(),    instances_.data(), options_.more_levels,
                              single_identity_, world_pad_scale_,  world_extent_};
-  return HWY_DYNAMIC_DISPATCH(next_entry)(tables, ray, context, node_tests);
+  HWY_DYNAMIC_DISPATCH(next_entries)(tables, jobs);
+}
+
+uint32_t TopTree::next(Ray& ray, RayContext& context, uint64_t& node_tests) const {
+  NextJob job{&ray, &context};
+  next({&job, 1});
+  node_tests += job.node_tests;
+  return job.entry;
 }
 
 uint32_t TopTree::next(Ray& ray, uint64_t& node_tests) const {

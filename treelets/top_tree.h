@@ -63,6 +63,14 @@ struct TraversalOptions {
 
 struct RayContext;  // treelets/ray_space.h
 
+/// One ray in search of its next treelet.
+struct NextJob {
+  Ray* ray;
+  RayContext* context;  ///< of this ray, kept while a worker has it in hand
+  uint32_t entry = kNoIndex;  ///< found: index of the entry; kNoIndex: there is none
+  uint32_t node_tests = 0;    ///< of this job, counted up
+};
+
 class TopTree {
  public:
   TopTree() = default;
@@ -76,7 +84,9 @@ class TopTree {
 
   /// Moves the ray's cursor to the next treelet entry whose box the ray enters at or before ray.t, and
   /// returns the entry's index, or kNoIndex when there is none (the cursor is then as before the start).
-  /// `node_tests` counts nodes tested.
+  /// Many rays in one call are faster than one in many calls: they are walked several at once, in turn.
+  void next(std::span<NextJob> jobs) const;
+  /// One ray; `node_tests` counts nodes tested.
   uint32_t next(Ray& ray, uint64_t& node_tests) const;
   /// The same for a worker that keeps `context` while it has this ray in hand: saves transforms and reciprocals.
   uint32_t next(Ray& ray, RayContext& context, uint64_t& node_tests) const;

@@ -1,6 +1,6 @@
-// One ray through one treelet, completely: every triangle below the entry's root that could be hit is
-// tested. Returns nothing about where the ray goes next; TopTree::next says that, and the engine routes.
-// Called by engine/render_*. Pure: reads the page, writes the ray. Any number of threads.
+// Rays through treelets, each completely: every triangle below an entry's root that could be hit is tested. Returns
+// nothing about where a ray goes next; TopTree::next says that, and the engine routes.
+// Called by engine/render_*. Pure: reads the pages, writes the rays. Any number of threads.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +13,32 @@
 
 namespace shoal {
 
+
 struct TraceCounters {
   uint64_t node_tests_count = 0;  ///< 8-wide nodes tested, in treelets and top tree
   uint64_t triangle_tests_count = 0;
   uint64_t coverage_tests_count = 0;
 };
 
-/// Crosses treelet `treelet` (its decoded geometry page) from `entry.root` in the space of `instance`.
+/// One ray at one treelet.
+struct TraceJob {
+  const std::byte* page;  ///< the decoded geometry page
+  Ray* ray;
+  RayContext* context;       ///< of this ray, kept while a worker has it in hand (treelets/ray_space.h)
+  const Instance* instance;  ///< the one that ray->instance names
+  TreeletEntry entry;
+  uint32_t node_tests = 0, triangle_tests = 0;  ///< of this job, counted up
+};
+
+/// Crosses each job's treelet from `entry.root`. Rays are traced several at once, each step of one while the others
+/// wait for memory: many jobs in one call are faster than one in many calls. Rays do not affect each other; the jobs
+/// may be of one treelet or of many.
 /// Closest hit: ray.t and ray.hit become the smallest (t, instance, primitive) so far.
 /// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
 /// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the
-/// page (as in PagePin::bytes), `instance` is the one that ray.instance names.
+/// page (as in PagePin::bytes). Adds the jobs' tests to `counters`.
+void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters);
+/// One ray. `instance` is the one that ray.instance names.
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
                    TraceCounters& counters);
 /// The same for a worker that keeps `context` while it has this ray in hand (treelets/ray_space.h).

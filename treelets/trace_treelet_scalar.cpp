@@ -25,26 +25,35 @@ uint32_t cross_node(const RaySpace& space, const QuantizedNode& node, float t, u
 
 }  // namespace
 
-void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
-                          Ray& ray, TraceCounters& counters) {
-  const TreeletView treelet(page);
-  const RaySpace space = to_object_space(ray, instance);
+void trace_treelet_scalar(TraceJob& job, TraceCounters& counters) {
+  const TreeletView treelet(job.page);
+  const Ray& ray = *job.ray;
+  const RaySpace& space = job.context->object_space(ray, *job.instance);
   TraversalStack stack;
-  NodeRef ref = entry.root;
+  NodeRef ref = job.entry.root;
   do {
     while (!is_leaf(ref)) {
-      ++counters.node_tests_count;
+      ++job.node_tests;
       const QuantizedNode& node = treelet.nodes[ref];
       uint32_t keys[8];
       const uint32_t mask = cross_node(space, node, ray.t, keys);
-      if (!stack.enter(keys, node.child, mask, ref, [](NodeRef) {}) && !stack.pop(ray.t, ref)) return;
+      if (!stack.enter(keys, node.child, mask, ref) && !stack.pop(ray.t, ref)) return;
     }
     const LeafView leaf = treelet.leaf(leaf_offset(ref));
-    counters.triangle_tests_count += leaf.triangle_count;
+    job.triangle_tests += leaf.triangle_count;
     for (uint32_t i = 0; i < leaf.triangle_count; ++i) {
-      if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, entry, ray, counters)) return;
+      if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, job, counters)) return;
     }
   } while (stack.pop(ray.t, ref));
+}
+
+void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
+                          Ray& ray, TraceCounters& counters) {
+  RayContext context;
+  TraceJob job{page.data(), &ray, &context, &instance, entry};
+  trace_treelet_scalar(job, counters);
+  counters.node_tests_count += job.node_tests;
+  counters.triangle_tests_count += job.triangle_tests;
 }
 
 }  // namespace shoal

@@ -1,12 +1,20 @@
 // The bytes of a treelet's geometry page: what traversal touches, and nothing else. Written by treelets/pack_treelet,
 // read by treelets/trace_treelet. Little-endian, offsets in bytes from the start of the page unless said otherwise.
 //
-//   TreeletHeader | QuantizedNode[node_count] | leaves | uint32 primitive[triangle_count] | coverage
+//   TreeletHeader | QuantizedNode[node_count] | leaves | coverage
 //
-// Leaf (4-byte aligned, from leaves_offset):
-//   LeafHeader | float x[vertex_count] | float y[] | float z[] | uint8 i0[triangle_count] | i1[] | i2[] | pad to 4
-// Vertices shared inside a leaf are stored once, positions are exact float32. i0,i1,i2 keep the corner order of
-// the source: barycentrics do not depend on packing.
+// Leaf (4-byte aligned, from leaves_offset), T triangles, V vertices:
+//   LeafHeader | positions | uint8 i0[T] | i1[T] | i2[T] | primitives | pad to 4
+// Vertices shared inside a leaf are stored once. i0,i1,i2 keep the corner order of the source: barycentrics do not
+// depend on packing.
+//
+// Positions are exact float32, in one of two forms:
+//   kLeafFloats set      float x[V] | y[V] | z[V]
+//   kLeafFloats clear    uint32 base[3] | uint16 low[3][V] | uint8 high[V] of each axis with its kLeafHighX bit
+// where the bits of a float are base + low + (high << 16). Neighbours differ in their low bits only, so this takes 6
+// to 9 bytes a vertex instead of 12; what does not fit (bits of an axis that span 2^24 or more) is stored as floats.
+//
+// Primitives: primitive_bytes planes of uint8[T], the lowest byte first; the id is their value + first_primitive.
 //
 // Coverage (only when coverage_offset != 0):
 //   uint32 record[triangle_count] (index, kNoIndex: opaque) | CoverageRecord[record_count] | alpha texels
@@ -20,8 +28,8 @@
 namespace shoal {
 
 inline constexpr uint32_t kTreeletMagic = 0x544c5254u;    // "TRLT"
-inline constexpr uint32_t kMaxLeafTriangles = 8;
-inline constexpr uint32_t kMaxLeafVertices = 24;
+inline constexpr uint32_t kMaxLeafTriangles = 16;
+inline constexpr uint32_t kMaxLeafVertices = 48;
 inline constexpr uint32_t kMaxTreeletDepth = 96;          ///< nodes from a root to a leaf; the packer checks it
 
 struct TreeletHeader {
@@ -30,12 +38,11 @@ struct TreeletHeader {
   uint32_t leaves_offset;
   uint32_t leaves_bytes;
   uint32_t triangle_count;
-  uint32_t primitives_offset;
   uint32_t uniform_material;   ///< kNoIndex: see the attribute page
   uint32_t coverage_offset;    ///< 0: every triangle is opaque
   uint32_t coverage_record_count;
   uint32_t coverage_texel_bytes;
-  uint32_t reserved[6];        ///< zero
+  uint32_t reserved[7];        ///< zero
 };
 static_assert(sizeof(TreeletHeader) == 64);
 
@@ -61,14 +68,21 @@ struct QuantizedNode {        // 96 bytes
 };
 static_assert(sizeof(QuantizedNode) == 96);
 
+/// LeafHeader::flags.
+inline constexpr uint8_t kLeafHighX = 1, kLeafHighY = 2, kLeafHighZ = 4;  ///< the axis has a plane of high bytes
+inline constexpr uint8_t kLeafHighMask = 7;
+inline constexpr uint8_t kLeafFloats = 8;     ///< positions as floats; no high planes
+inline constexpr uint8_t kLeafCoverage = 16;  ///< some triangle has a coverage record
+
 struct LeafHeader {
   uint8_t triangle_count;     ///< 1 .. kMaxLeafTriangles
   uint8_t vertex_count;       ///< 3 .. kMaxLeafVertices
-  uint8_t has_coverage;       ///< 1: some triangle has a coverage record
-  uint8_t reserved;
+  uint8_t flags;
+  uint8_t primitive_bytes;    ///< 0 .. 4
   uint32_t first_ordinal;     ///< of its first triangle among the treelet's triangles
+  uint32_t first_primitive;   ///< the least primitive id of the leaf
 };
-static_assert(sizeof(LeafHeader) == 8);
+static_assert(sizeof(LeafHeader) == 12);
 
 /// Coverage of one triangle (treelets/coverage.h). uv are in texels of the chosen level, before wrapping, with
 /// texel centres at +0.5; the crop holds texels [crop_x, crop_x + crop_width) x [crop_y, ...) of that unwrapped space,

@@ -2,6 +2,7 @@
 // copied. Made by whoever reads a treelet. Requires: the page passed check_treelet(). Cost: a few additions.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <span>
 
@@ -10,26 +11,80 @@
 
 namespace shoal {
 
+/// Where the parts of a leaf lie, in bytes from its start.
+struct LeafParts {
+  uint32_t high;     ///< planes of high bytes (kLeafFloats clear)
+  uint32_t corners;  ///< i0[], i1[], i2[]
+  uint32_t end;      ///< before the padding
+
+  static constexpr uint32_t kPositions = sizeof(LeafHeader);
+  static constexpr uint32_t kLow = kPositions + 3 * sizeof(uint32_t);
+  static constexpr LeafParts of(const LeafHeader& leaf) {
+    const uint32_t v = leaf.vertex_count, t = leaf.triangle_count;
+    const uint32_t planes = static_cast<uint32_t>(std::popcount(static_cast<uint8_t>(leaf.flags & kLeafHighMask)));
+    const uint32_t high = kLow + 6 * v;
+    const uint32_t corners = (leaf.flags & kLeafFloats) != 0 ? kPositions + 12 * v : high + planes * v;
+    return {high, corners, corners + (3 + leaf.primitive_bytes) * t};
+  }
+  constexpr uint32_t padded_bytes() const { return (end + 3) & ~3u; }
+};
+
 struct LeafView {
   const std::byte* leaf;
   uint32_t triangle_count, vertex_count;
+  LeafParts parts;
 
   explicit LeafView(const std::byte* at)
-      : leaf(at), triangle_count(header().triangle_count), vertex_count(header().vertex_count) {}
+      : leaf(at),
+        triangle_count(header().triangle_count),
+        vertex_count(header().vertex_count),
+        parts(LeafParts::of(header())) {}
 
   const LeafHeader& header() const { return *reinterpret_cast<const LeafHeader*>(leaf); }
-  /// x[], y[] or z[] of the vertices.
-  const float* axis(uint32_t k) const {
-    return reinterpret_cast<const float*>(leaf + sizeof(LeafHeader)) + size_t{k} * vertex_count;
-  }
+  bool has_coverage() const { return (header().flags & kLeafCoverage) != 0; }
+  bool has_floats() const { return (header().flags & kLeafFloats) != 0; }
+  /// Bytes with padding: where the next leaf begins.
+  uint32_t bytes() const { return parts.padded_bytes(); }
   /// i0[], i1[] or i2[] of the triangles.
-  const uint8_t* corner(uint32_t k) const {
-    return reinterpret_cast<const uint8_t*>(axis(3)) + size_t{k} * triangle_count;
+  const uint8_t* corner(uint32_t k) const { return bytes_at(parts.corners) + size_t{k} * triangle_count; }
+
+  /// x[], y[] or z[] of the vertices. Requires: has_floats().
+  const float* floats(uint32_t axis) const {
+    return reinterpret_cast<const float*>(leaf + LeafParts::kPositions) + size_t{axis} * vertex_count;
+  }
+  /// Requires for these three: not has_floats(); for high(): the axis has a plane.
+  uint32_t base(uint32_t axis) const {
+    return reinterpret_cast<const uint32_t*>(leaf + LeafParts::kPositions)[axis];
+  }
+  const uint16_t* low(uint32_t axis) const {
+    return reinterpret_cast<const uint16_t*>(leaf + LeafParts::kLow) + size_t{axis} * vertex_count;
+  }
+  bool has_high(uint32_t axis) const { return (header().flags >> axis & 1) != 0; }
+  const uint8_t* high(uint32_t axis) const {
+    const auto before = static_cast<uint8_t>(header().flags & ((1u << axis) - 1));
+    return bytes_at(parts.high) + size_t{static_cast<uint32_t>(std::popcount(before))} * vertex_count;
+  }
+
+  float coordinate(uint32_t axis, uint32_t vertex) const {
+    if (has_floats()) return floats(axis)[vertex];
+    const uint32_t above = has_high(axis) ? uint32_t{high(axis)[vertex]} << 16 : 0;
+    return std::bit_cast<float>(base(axis) + low(axis)[vertex] + above);
   }
   Vec3 position(uint32_t triangle, uint32_t k) const {
-    const float* x = axis(0) + corner(k)[triangle];
-    return {x[0], x[vertex_count], x[2 * size_t{vertex_count}]};
+    const uint32_t vertex = corner(k)[triangle];
+    return {coordinate(0, vertex), coordinate(1, vertex), coordinate(2, vertex)};
   }
+  uint32_t primitive(uint32_t triangle) const {
+    const uint8_t* plane = corner(3) + triangle;
+    uint32_t id = 0;
+    for (uint32_t byte = 0; byte < header().primitive_bytes; ++byte, plane += triangle_count) {
+      id |= uint32_t{*plane} << (8 * byte);
+    }
+    return header().first_primitive + id;
+  }
+
+ private:
+  const uint8_t* bytes_at(uint32_t offset) const { return reinterpret_cast<const uint8_t*>(leaf + offset); }
 };
 
 struct TreeletView {
@@ -37,14 +92,14 @@ struct TreeletView {
   const TreeletHeader* header;
   const QuantizedNode* nodes;
 
-  explicit TreeletView(std::span<const std::byte> bytes)
-      : page(bytes.data()),
+  explicit TreeletView(std::span<const std::byte> bytes) : TreeletView(bytes.data()) {}
+  explicit TreeletView(const std::byte* begin)
+      : page(begin),
         header(reinterpret_cast<const TreeletHeader*>(page)),
         nodes(reinterpret_cast<const QuantizedNode*>(page + sizeof(TreeletHeader))) {}
 
   /// `offset` in units of 4 bytes, as in NodeRef and Hit::slot.
   LeafView leaf(uint32_t offset) const { return LeafView(page + header->leaves_offset + size_t{4} * offset); }
-  const uint32_t* primitives() const { return reinterpret_cast<const uint32_t*>(page + header->primitives_offset); }
   /// Requires: header->coverage_offset != 0.
   const uint32_t* coverage_of() const { return reinterpret_cast<const uint32_t*>(page + header->coverage_offset); }
   const CoverageRecord* coverage_records() const {
@@ -54,10 +109,5 @@ struct TreeletView {
     return reinterpret_cast<const uint8_t*>(coverage_records() + header->coverage_record_count);
   }
 };
-
-/// Bytes of a leaf, padded to 4.
-inline constexpr uint32_t leaf_bytes(uint32_t triangle_count, uint32_t vertex_count) {
-  return (static_cast<uint32_t>(sizeof(LeafHeader)) + 12 * vertex_count + 3 * triangle_count + 3) & ~3u;
-}
 
 }  // namespace shoal

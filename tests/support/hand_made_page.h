@@ -99,12 +99,10 @@ class PagePacker {
     h.leaves_offset = static_cast<uint32_t>(sizeof h + nodes_.size() * sizeof(QuantizedNode));
     h.leaves_bytes = static_cast<uint32_t>(leaves_.size());
     h.triangle_count = static_cast<uint32_t>(primitives_.size());
-    h.primitives_offset = h.leaves_offset + h.leaves_bytes;
     std::vector<std::byte> page;
     append(page, &h, 1);
     append(page, nodes_.data(), nodes_.size());
     append(page, leaves_.data(), leaves_.size());
-    append(page, primitives_.data(), primitives_.size());
     if (!record_of_) return page;
     h.coverage_offset = static_cast<uint32_t>(page.size());
     h.coverage_record_count = static_cast<uint32_t>(records_.size());
@@ -134,6 +132,7 @@ class PagePacker {
     LeafHeader header{};
     header.triangle_count = static_cast<uint8_t>(triangles.size());
     header.first_ordinal = static_cast<uint32_t>(primitives_.size());
+    header.primitive_bytes = 4, header.flags = kLeafFloats;
     for (const TestTriangle& t : triangles) {
       for (int k = 0; k < 3; ++k) {
         const auto same_bits = [&](const Vec3& v) { return std::memcmp(&v, &t.p[k], sizeof v) == 0; };
@@ -142,7 +141,7 @@ class PagePacker {
         if (found == vertices.end()) vertices.push_back(t.p[k]);
       }
       primitives_.push_back(t.primitive);
-      if (record_of_ && record_of_(t.primitive) != kNoIndex) header.has_coverage = 1;
+      if (record_of_ && record_of_(t.primitive) != kNoIndex) header.flags |= kLeafCoverage;
     }
     header.vertex_count = static_cast<uint8_t>(vertices.size());
     append(leaves_, &header, 1);
@@ -150,6 +149,12 @@ class PagePacker {
       for (const Vec3& v : vertices) append(leaves_, &v[axis], 1);
     }
     for (const auto& c : corner) append(leaves_, c.data(), c.size());
+    for (int byte = 0; byte < 4; ++byte) {
+      for (const TestTriangle& t : triangles) {
+        const auto value = static_cast<uint8_t>(t.primitive >> (8 * byte));
+        append(leaves_, &value, 1);
+      }
+    }
     leaves_.resize((leaves_.size() + 3) / 4 * 4);
     return kLeafBit | offset;
   }

@@ -117,8 +117,16 @@ class Reader {
     const auto leaf = read<LeafHeader>(*page_, at);
     expect(leaf.triangle_count >= 1 && leaf.triangle_count <= kMaxLeafTriangles, "triangles of a leaf");
     expect(leaf.vertex_count >= 3 && leaf.vertex_count <= kMaxLeafVertices, "vertices of a leaf");
-    const size_t vertices = at + sizeof leaf, indices = vertices + 12 * size_t{leaf.vertex_count};
-    expect(indices + 3 * size_t{leaf.triangle_count} <= header_.leaves_offset + header_.leaves_bytes, "leaf's end");
+    const size_t t_count = leaf.triangle_count, v_count = leaf.vertex_count;
+    const bool floats = (leaf.flags & kLeafFloats) != 0;
+    size_t indices = at + sizeof leaf + 12 * v_count;
+    if (!floats) {
+      indices = at + sizeof leaf + 12 + 6 * v_count;
+      for (uint32_t axis = 0; axis < 3; ++axis) indices += (leaf.flags >> axis & 1) * v_count;
+    }
+    expect(!floats || (leaf.flags & 7) == 0, "high planes beside floats");
+    const size_t primitives = indices + 3 * t_count;
+    expect(primitives + leaf.primitive_bytes * t_count <= header_.leaves_offset + header_.leaves_bytes, "leaf's end");
     triangle_.depth = depth;
     bool covered = false;
     for (uint32_t t = 0; t < leaf.triangle_count; ++t) {
@@ -126,21 +134,36 @@ class Reader {
         const auto v = read<uint8_t>(*page_, indices + c * leaf.triangle_count + t);
         expect(v < leaf.vertex_count, "vertex index of a leaf");
         for (uint32_t axis = 0; axis < 3; ++axis) {
-          triangle_.position[3 * c + axis] =
-              read<float>(*page_, vertices + 4 * (size_t{axis} * leaf.vertex_count + v));
+          triangle_.position[3 * c + axis] = read_coordinate(at, leaf, axis, v);
         }
       }
       for (const Bounds3& box : boxes_) expect(inside(triangle_.position, box), "a vertex outside a box above it");
+      triangle_.primitive = leaf.first_primitive;
+      for (uint32_t byte = 0; byte < leaf.primitive_bytes; ++byte) {
+        triangle_.primitive += uint32_t{read<uint8_t>(*page_, primitives + byte * t_count + t)} << (8 * byte);
+      }
       read_ordinal(leaf.first_ordinal + t);
       covered |= triangle_.coverage.has_value();
       visit_(triangle_);
     }
-    expect((leaf.has_coverage != 0) == covered, "has_coverage of a leaf");
+    expect(((leaf.flags & kLeafCoverage) != 0) == covered, "has_coverage of a leaf");
+  }
+
+  float read_coordinate(size_t at, const LeafHeader& leaf, uint32_t axis, size_t v) {
+    const size_t v_count = leaf.vertex_count, positions = at + sizeof leaf;
+    if ((leaf.flags & kLeafFloats) != 0) return read<float>(*page_, positions + 4 * (axis * v_count + v));
+    uint32_t bits = read<uint32_t>(*page_, positions + 4 * size_t{axis});
+    bits += read<uint16_t>(*page_, positions + 12 + 2 * (axis * v_count + v));
+    size_t plane = positions + 12 + 6 * v_count;
+    for (uint32_t before = 0; before < axis; ++before) plane += (leaf.flags >> before & 1) * v_count;
+    if ((leaf.flags >> axis & 1) != 0) bits += uint32_t{read<uint8_t>(*page_, plane + v)} << 16;
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
   }
 
   void read_ordinal(uint32_t ordinal) {
     expect(ordinal < header_.triangle_count, "ordinal out of range");
-    triangle_.primitive = read<uint32_t>(*page_, header_.primitives_offset + 4 * size_t{ordinal});
     triangle_.coverage.reset();
     triangle_.texels.clear();
     if (header_.coverage_offset != 0) read_coverage(ordinal);

@@ -13,7 +13,7 @@ RaySpace random_space(std::mt19937& random, float pad) {
   if (random() % 4 == 0) direction[static_cast<int>(random() % 3)] = random() % 2 ? 0.0f : -0.0f;
   if (random() % 8 == 0) direction[static_cast<int>(random() % 3)] = 1e-42f;
   RaySpace space = prepare_ray(random_vector(random, 2), direction);
-  set_pad(space, pad);
+  set_pad(space, pad, 2);
   return space;
 }
 
@@ -55,14 +55,14 @@ TEST(BoxTest, ARayThroughAPointOfTheBoxEntersIt) {
     // The direction is rounded by u R: within the pad at t = 1.
     const Vec3 origin = random_vector(random, i % 5 ? 2.0f : 1000.0f);
     RaySpace space = prepare_ray(origin, target - origin);
-    set_pad(space, object_pad(space, 1));
+    set_pad(space, object_pad(space, 1), 2);
     EXPECT_TRUE(cross_box(space, &box.lo.x, &box.hi.x).entered(1.00001f)) << i;
   }
 }
 
 TEST(BoxTest, ABoxThatBeginsAtExactlyTheEndIsEntered) {
   RaySpace space = prepare_ray({0, 0, 0}, {1, 0, 0});
-  set_pad(space, 0);
+  set_pad(space, 0, 1);
   const float lo[3] = {2, -1, -1}, hi[3] = {3, 1, 1};
   const BoxSpan span = cross_box(space, lo, hi);
   EXPECT_EQ(span.t_near, 2);
@@ -76,7 +76,7 @@ TEST(BoxTest, MakesNoNanFromZeroHugeOrSubnormalNumbers) {
   const auto pick = [&] { return Vec3(values[random() % 8], values[random() % 8], values[random() % 8]); };
   for (int i = 0; i < 200000; ++i) {
     RaySpace space = prepare_ray(pick(), pick());
-    set_pad(space, values[random() % 2 ? 0 : 4]);
+    set_pad(space, values[random() % 2 ? 0 : 4], 1);
     Bounds3 box;
     box.include(pick()), box.include(pick());
     const BoxSpan span = cross_box(space, &box.lo.x, &box.hi.x);

@@ -67,7 +67,9 @@ TEST(CheckTreelet, RejectsFieldsThatDoNotFit) {
   rejects("leaves offset", [](H& h, N*, B*, B*) { h.leaves_offset = 64; });
   rejects("leaves bytes", [](H& h, N*, B*, B*) { h.leaves_bytes = 0xfffffffcu; });
   rejects("triangle count", [](H& h, N*, B*, B*) { h.triangle_count = 0x40000001u; });
-  rejects("primitives offset", [](H& h, N*, B*, B*) { h.primitives_offset += 2; });
+  rejects("bytes of primitive ids", [](H&, N*, B* leaf, B*) { leaf[3] = B{5}; });
+  rejects("high planes of floats", [](H&, N*, B* leaf, B*) { leaf[2] |= B{kLeafHighY}; });
+  rejects("unknown flags", [](H&, N*, B* leaf, B*) { leaf[2] |= B{0x80}; });
   rejects("coverage records", [](H& h, N*, B*, B*) { h.coverage_record_count = 1u << 30; });
   rejects("no coverage for covered leaves", [](H& h, N*, B*, B*) { h.coverage_offset = 0; });
   rejects("child of itself", [](H&, N* n, B*, B*) { n[0].child[0] = 0; });
@@ -79,12 +81,12 @@ TEST(CheckTreelet, RejectsFieldsThatDoNotFit) {
   rejects("leaf past the end", [](H& h, N* n, B*, B*) { n[0].child[0] = kLeafBit | h.leaves_bytes / 4; });
   rejects("origin", [](H&, N* n, B*, B*) { n[0].origin[2] = NAN; });
   rejects("exponent", [](H&, N* n, B*, B*) { n[0].exponent[2] = -128; });
-  rejects("nine triangles", [](H&, N*, B* leaf, B*) { leaf[0] = B{9}; });
+  rejects("17 triangles", [](H&, N*, B* leaf, B*) { leaf[0] = B{17}; });
   rejects("no triangle", [](H&, N*, B* leaf, B*) { leaf[0] = B{0}; });
-  rejects("25 vertices", [](H&, N*, B* leaf, B*) { leaf[1] = B{25}; });
-  rejects("vertex index", [](H&, N*, B* leaf, B*) { leaf[8 + 12 * std::to_integer<size_t>(leaf[1])] = leaf[1]; });
+  rejects("49 vertices", [](H&, N*, B* leaf, B*) { leaf[1] = B{49}; });
+  rejects("vertex index", [](H&, N*, B* leaf, B*) { leaf[12 + 12 * std::to_integer<size_t>(leaf[1])] = leaf[1]; });
   rejects("ordinal", [](H&, N*, B* leaf, B*) { reinterpret_cast<LeafHeader*>(leaf)->first_ordinal = 0xffffffffu; });
-  rejects("position", [](H&, N*, B* leaf, B*) { reinterpret_cast<float*>(leaf)[2] = INFINITY; });
+  rejects("position", [](H&, N*, B* leaf, B*) { reinterpret_cast<float*>(leaf)[3] = INFINITY; });
   rejects("record index", [](H&, N*, B*, B* coverage) { reinterpret_cast<uint32_t*>(coverage)[0] = 2; });
   const auto record = [](H& h, B* coverage) {
     return reinterpret_cast<CoverageRecord*>(coverage + 4 * h.triangle_count);
@@ -112,8 +114,9 @@ TEST(CheckTreelet, LeavesAtMostTheAgreedDepth) {
     TreeletHeader h{};
     h.magic = kTreeletMagic, h.node_count = nodes, h.triangle_count = 1;
     h.leaves_offset = static_cast<uint32_t>(sizeof h + nodes * sizeof(QuantizedNode));
-    h.leaves_bytes = leaf_bytes(1, 3), h.primitives_offset = h.leaves_offset + h.leaves_bytes;
-    std::vector<std::byte> page(h.primitives_offset + 4);
+    const LeafHeader leaf{1, 3, kLeafFloats, 0, 0, 0};
+    h.leaves_bytes = LeafParts::of(leaf).padded_bytes();
+    std::vector<std::byte> page(h.leaves_offset + h.leaves_bytes);
     std::memcpy(page.data(), &h, sizeof h);
     for (uint32_t i = 0; i < nodes; ++i) {
       QuantizedNode node{};
@@ -121,7 +124,6 @@ TEST(CheckTreelet, LeavesAtMostTheAgreedDepth) {
       node.child[0] = i + 1 < nodes ? i + 1 : kLeafBit;
       std::memcpy(page.data() + sizeof h + i * sizeof node, &node, sizeof node);
     }
-    const LeafHeader leaf{1, 3, 0, 0, 0};
     std::memcpy(page.data() + h.leaves_offset, &leaf, sizeof leaf);
     return AlignedPage(page);
   };

@@ -78,7 +78,10 @@ size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t mo
     trace_scene(tree, scene.pages, found, trace_treelet);
     expect_same(expected, scalar, i);
     expect_same(expected, found, i);
-    EXPECT_EQ(std::memcmp(&scalar, &found, sizeof(Ray)), 0) << "ray " << i;
+    // Which occluder an any-hit ray finds depends on the order of its boxes, which are only conservative.
+    if (!expected.any_hit()) {
+      EXPECT_EQ(std::memcmp(&scalar, &found, sizeof(Ray)), 0) << "ray " << i;
+    }
     if (::testing::Test::HasFatalFailure()) return hits;
     hits += expected.hit.valid();
   }

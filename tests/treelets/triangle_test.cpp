@@ -26,7 +26,7 @@ DoubleHit intersect_double(const Vec3& origin, const Vec3& direction, const Test
 
 RaySpace space_of(const Vec3& origin, const Vec3& direction, float max_abs_coordinate) {
   RaySpace space = prepare_ray(origin, direction);
-  set_pad(space, object_pad(space, max_abs_coordinate));
+  set_pad(space, object_pad(space, max_abs_coordinate), 1);
   return space;
 }
 

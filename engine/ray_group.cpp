@@ -1,0 +1,43 @@
+#include "engine/ray_group.h"
+
+namespace shoal {
+
+/// Finds the next entry of every ray that stands on none.
+void RayGroup::address(const TopTree& tree) {
+  NextJob jobs[kCapacity];
+  uint8_t slots[kCapacity];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < size_; ++i) {
+    GroupRay& member = rays_[slot_[i]];
+    if (member.page != nullptr) continue;
+    entry_[slot_[i]] = kNoIndex;
+    if (member.ray.any_hit() && member.ray.hit.valid()) continue;
+    jobs[count] = {&member.ray, &member.context};
+    slots[count++] = slot_[i];
+  }
+  tree.next({jobs, count});
+  for (uint32_t k = 0; k < count; ++k) {
+    entry_[slots[k]] = jobs[k].entry;
+    rays_[slots[k]].node_tests += jobs[k].node_tests;
+  }
+}
+
+/// Traces every ray through the treelet that it stands on.
+void RayGroup::trace(const TopTree& tree, TraceCounters& counters) {
+  TraceJob jobs[kCapacity];
+  for (uint32_t i = 0; i < size_; ++i) {
+    GroupRay& member = rays_[slot_[i]];
+    jobs[i] = {member.page, &member.ray, &member.context, &tree.instance(member.ray.instance),
+               tree.current(member.ray)};
+  }
+  trace_treelets({jobs, size_}, counters);
+  for (uint32_t i = 0; i < size_; ++i) {
+    GroupRay& member = rays_[slot_[i]];
+    member.node_tests += jobs[i].node_tests;
+    member.triangle_tests += jobs[i].triangle_tests;
+    member.page = nullptr;
+    member.traced = true;
+  }
+}
+
+}  // namespace shoal

@@ -1,0 +1,132 @@
+// A ray against all triangles of a leaf at once. Included once a target (foreach_target.h).
+#if defined(SHOAL_TREELETS_LEAF_KERNEL_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHOAL_TREELETS_LEAF_KERNEL_INL_H
+#undef SHOAL_TREELETS_LEAF_KERNEL_INL_H
+#else
+#define SHOAL_TREELETS_LEAF_KERNEL_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "treelets/treelet_view.h"
+#include "treelets/triangle_test.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace shoal {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using F16 = hn::CappedTag<float, 16>;
+using I16 = hn::RebindToSigned<F16>;
+using V16 = hn::Vec<F16>;
+inline constexpr size_t kLeafLanes = hn::MaxLanes(F16());
+
+struct ShearedLanes {
+  V16 x, y;
+};
+
+/// A coordinate of the vertices from `first` on. Reads past the last vertex, inside the page and 64 bytes after it.
+HWY_INLINE V16 load_vertices(const LeafView& leaf, uint32_t axis, size_t first) {
+  const F16 f;
+  const I16 i;
+  if (leaf.has_floats()) return hn::LoadU(f, leaf.floats(axis) + first);
+  const auto low = hn::PromoteTo(i, hn::LoadU(hn::Rebind<uint16_t, F16>(), leaf.low(axis) + first));
+  const auto high = hn::PromoteTo(i, hn::LoadU(hn::Rebind<uint8_t, F16>(), leaf.high(axis) + first));
+  const auto above = hn::And(hn::ShiftLeft<16>(high), hn::Set(i, leaf.has_high(axis) ? -1 : 0));
+  return hn::BitCast(f, hn::Add(hn::Or(low, above), hn::Set(i, static_cast<int32_t>(leaf.base(axis)))));
+}
+
+/// The vertices from `first` on, translated and sheared: shear() of triangle_test.h.
+HWY_INLINE ShearedLanes shear_vertices(const RaySpace& ray, const LeafView& leaf, size_t first) {
+  const F16 f;
+  const auto x = load_vertices(leaf, ray.kx, first), y = load_vertices(leaf, ray.ky, first);
+  const auto z = hn::Sub(load_vertices(leaf, ray.kz, first), hn::Set(f, ray.origin[ray.kz]));
+  return {hn::Sub(hn::Sub(x, hn::Set(f, ray.origin[ray.kx])), hn::Mul(hn::Set(f, ray.shear_x), z)),
+          hn::Sub(hn::Sub(y, hn::Set(f, ray.origin[ray.ky])), hn::Mul(hn::Set(f, ray.shear_y), z))};
+}
+
+HWY_INLINE hn::Vec<I16> corner_indices(const LeafView& leaf, uint32_t k, size_t first) {
+  return hn::PromoteTo(I16(), hn::LoadU(hn::Rebind<uint8_t, F16>(), leaf.corner(k) + first));
+}
+
+#if HWY_MAX_BYTES >= 64
+/// The sheared corners of the leaf's triangles, a lane a triangle: vertices are sheared once and then looked up in
+/// registers. Lanes past the last triangle hold anything.
+struct LeafCorners {
+  ShearedLanes corner[3];
+
+  HWY_INLINE LeafCorners(const RaySpace& ray, const LeafView& leaf) {
+    const F16 f;
+    const I16 i;
+    ShearedLanes table = shear_vertices(ray, leaf, 0);
+    hn::Vec<I16> index[3];
+    for (uint32_t k = 0; k < 3; ++k) {
+      index[k] = corner_indices(leaf, k, 0);
+      const auto lanes = hn::IndicesFromVec(f, hn::And(index[k], hn::Set(i, 15)));
+      corner[k] = {hn::TableLookupLanes(table.x, lanes), hn::TableLookupLanes(table.y, lanes)};
+    }
+    for (uint32_t first = 16; first < leaf.vertex_count; first += 16) {
+      table = shear_vertices(ray, leaf, first);
+      for (uint32_t k = 0; k < 3; ++k) {
+        const auto lanes = hn::IndicesFromVec(f, hn::And(index[k], hn::Set(i, 15)));
+        const auto here = hn::RebindMask(f, hn::Gt(index[k], hn::Set(i, static_cast<int32_t>(first) - 1)));
+        corner[k] = {hn::IfThenElse(here, hn::TableLookupLanes(table.x, lanes), corner[k].x),
+                     hn::IfThenElse(here, hn::TableLookupLanes(table.y, lanes), corner[k].y)};
+      }
+    }
+  }
+  HWY_INLINE ShearedLanes at(uint32_t k, size_t) const { return corner[k]; }
+};
+#else
+/// The same for narrower vectors: sheared vertices go through memory.
+struct LeafCorners {
+  HWY_ALIGN float x[kMaxLeafVertices + kLeafLanes], y[kMaxLeafVertices + kLeafLanes];
+  const LeafView& leaf;
+
+  HWY_INLINE LeafCorners(const RaySpace& ray, const LeafView& view) : leaf(view) {
+    for (size_t first = 0; first < leaf.vertex_count; first += kLeafLanes) {
+      const ShearedLanes sheared = shear_vertices(ray, leaf, first);
+      hn::StoreU(sheared.x, F16(), x + first);
+      hn::StoreU(sheared.y, F16(), y + first);
+    }
+  }
+  HWY_INLINE ShearedLanes at(uint32_t k, size_t first) const {
+    // Lanes past the last triangle hold other bytes: kept inside the leaf, their result is dropped.
+    const auto last = hn::Set(I16(), static_cast<int32_t>(leaf.vertex_count) - 1);
+    const auto index = hn::Min(corner_indices(leaf, k, first), last);
+    return {hn::GatherIndex(F16(), x, index), hn::GatherIndex(F16(), y, index)};
+  }
+};
+#endif
+
+/// The triangles of a leaf that the exact test may accept: all but those with edge functions of certainly different
+/// signs, by the float arithmetic of triangle_test.h.
+HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf) {
+  const F16 f;
+  const LeafCorners corners(ray, leaf);
+  uint32_t rejected = 0;
+  for (size_t first = 0; first < leaf.triangle_count; first += kLeafLanes) {
+    const ShearedLanes corner[3] = {corners.at(0, first), corners.at(1, first), corners.at(2, first)};
+    auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
+    const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
+    for (int e = 0; e < 3; ++e) {
+      const auto p1 = hn::Mul(corner[from[e]].x, corner[to[e]].y);
+      const auto p2 = hn::Mul(corner[from[e]].y, corner[to[e]].x);
+      const auto value = hn::Sub(p1, p2);
+      const auto bound =
+          hn::Add(hn::Mul(hn::Set(f, kEdgeError), hn::Add(hn::Abs(p1), hn::Abs(p2))), hn::Set(f, kEdgeUnderflow));
+      positive = hn::Or(positive, hn::Gt(value, bound));
+      negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
+    }
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(f, hn::And(positive, negative), bits);
+    rejected |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << first;
+  }
+  return ~rejected & ((1u << leaf.triangle_count) - 1);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace shoal
+HWY_AFTER_NAMESPACE();
+
+#endif
