@@ -60,10 +60,12 @@ class RivalRun {
     }
     std::vector<double> bounds;
     for (Turns& turns : turns_) turns.seconds.clear();  // they were warming up
+    all_ = {};
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       for (Turns& turns : turns_) turns.seconds.push_back(seconds_of(turns.run()));
       bounds.push_back(bound_rays_per_second(scene_, set_, row_.threads, options_.cpu_time));
     }
+    row_.cpu_share = all_.cpu / all_.wall;
     std::sort(bounds.begin(), bounds.end());
     row_.bound = bounds[bounds.size() / 2] * 1e-6;
     for (size_t i = 0; i < kOrderCount; ++i) row_.shoal[i] = rate(*shoal[i]);
@@ -78,7 +80,10 @@ class RivalRun {
   }
 
  private:
-  double seconds_of(const TeamSeconds& seconds) const { return options_.cpu_time ? seconds.cpu : seconds.wall; }
+  double seconds_of(const TeamSeconds& seconds) {
+    all_.wall += seconds.wall, all_.cpu += seconds.cpu;
+    return options_.cpu_time ? seconds.cpu : seconds.wall;
+  }
   double rate(Turns& turns) const { return static_cast<double>(row_.rays) / turns.median() * 1e-6; }
 
   /// Adds a program, and warms it up.
@@ -129,8 +134,9 @@ class RivalRun {
   RivalRow row_;
   RaySorter sorter_;  ///< Embree's
   std::unique_ptr<RayOrder> orders_[kOrderCount];
-  std::vector<RayAnswer> ours_, answers_;
+  LargeVector<RayAnswer> ours_, answers_;
   std::vector<Turns> turns_;
+  TeamSeconds all_;  ///< sums over the turns that count
 };
 
 }  // namespace

@@ -34,6 +34,7 @@ struct RivalRow {
   double embree_packet = 0, embree_stream = 0, embree_sorted = 0;  ///< over the faster of the two scenes
   uint64_t stream_rays = 0;  ///< a call, of the fastest stream
   double bound = 0;
+  double cpu_share = 0;  ///< CPU time of the busiest thread over wall time, all turns: below 1, others had the cores
   uint64_t disagreeing = 0;        ///< rays, of the program of Embree's that differs most from ours
   uint64_t orders_disagreeing = 0;  ///< rays whose answers our own orders do not give to the bit: a bug
 

@@ -32,7 +32,7 @@ struct RayAnswer {
 /// Rays that are traced together.
 struct RaySet {
   std::string name;
-  std::vector<BenchRay> rays;
+  LargeVector<BenchRay> rays;
   bool any_hit = false;
   bool coherent = false;  ///< neighbours take nearly the same way
 };

@@ -26,7 +26,7 @@ void take_coverage_out(std::span<std::byte> page) {
 /// Finds the vertex with the same bits, or appends it. Open addressing, at most half full.
 class VertexTable {
  public:
-  VertexTable(uint64_t expected, std::vector<float>& vertices)
+  VertexTable(uint64_t expected, LargeVector<float>& vertices)
       : places_(std::bit_ceil(std::max<uint64_t>(2 * expected, 1024)), kNoIndex), vertices_(vertices) {}
 
   uint32_t index_of(const Vec3& p) {
@@ -51,7 +51,7 @@ class VertexTable {
   }
 
   void grow() {
-    std::vector<uint32_t>(2 * places_.size(), kNoIndex).swap(places_);
+    LargeVector<uint32_t>(2 * places_.size(), kNoIndex).swap(places_);
     const uint64_t mask = places_.size() - 1;
     for (uint32_t index = 0; index < vertices_.size() / 3; ++index) {
       Vec3 p;
@@ -62,8 +62,8 @@ class VertexTable {
     }
   }
 
-  std::vector<uint32_t> places_;
-  std::vector<float>& vertices_;
+  LargeVector<uint32_t> places_;
+  LargeVector<float>& vertices_;
 };
 
 /// Treelets below `node`, each once, ascending.

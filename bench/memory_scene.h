@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/large_vector.h"
 #include "engine/scene.h"
-#include "io/huge_memory.h"
 
 namespace shoal::bench {
 
@@ -31,8 +31,8 @@ struct WorldMesh {
     uint64_t first_triangle;
     uint32_t instance;
   };
-  std::vector<float> vertices;  ///< one float more at the end: 16 bytes may be read at each vertex
-  std::vector<uint32_t> indices;
+  LargeVector<float> vertices;  ///< one float more at the end: 16 bytes may be read at each vertex
+  LargeVector<uint32_t> indices;
   std::vector<InstanceStart> instances;  ///< ascending
 
   uint64_t triangle_count() const { return indices.size() / 3; }

@@ -122,7 +122,7 @@ class QueuedThread {
 
   /// Begins the next rays; false when there are none, or no room for them.
   bool admit() {
-    const std::vector<BenchRay>& rays = context_.set->rays;
+    const LargeVector<BenchRay>& rays = context_.set->rays;
     if (context_.next_ray >= rays.size() || context_.in_flight + kRaysPerGrab > context_.in_flight_limit) return false;
     context_.in_flight += kRaysPerGrab;
     const uint64_t first = context_.next_ray.fetch_add(kRaysPerGrab);

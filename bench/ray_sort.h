@@ -31,7 +31,7 @@ class RaySorter {
   Vec3 lo_, scale_;
   unsigned threads_;
   std::barrier<> barrier_;
-  std::vector<uint64_t> items_, scattered_;       ///< key above, index of the ray below
+  LargeVector<uint64_t> items_, scattered_;       ///< key above, index of the ray below
   std::vector<std::vector<uint64_t>> histograms_;  ///< a thread, a digit
 };
 

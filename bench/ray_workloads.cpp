@@ -120,7 +120,7 @@ Result<const std::vector<Ray>*> RayWorkloads::diffuse_hits() {
   return &diffuse_hits_;
 }
 
-std::vector<Ray> RayWorkloads::hits_of(const std::vector<BenchRay>& rays) const {
+std::vector<Ray> RayWorkloads::hits_of(const LargeVector<BenchRay>& rays) const {
   std::vector<Ray> traced(rays.size());
   std::atomic<uint64_t> next{0};
   run_together(threads_, [&](unsigned) {
@@ -137,13 +137,13 @@ std::vector<Ray> RayWorkloads::hits_of(const std::vector<BenchRay>& rays) const 
   return traced;
 }
 
-std::vector<BenchRay> RayWorkloads::primary_rays() const {
+LargeVector<BenchRay> RayWorkloads::primary_rays() const {
   const auto height = static_cast<uint32_t>(std::max(1.0, std::sqrt(static_cast<double>(ray_count_) / kAspect)));
   const auto width = static_cast<uint32_t>(std::max<uint64_t>(1, ray_count_ / height));
   const SampleOrder order(width, height, 1);
   const Scene& scene = scene_.scene;
   const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[0], width, height);
-  std::vector<BenchRay> rays(order.count());
+  LargeVector<BenchRay> rays(order.count());
   for (uint64_t i = 0; i < rays.size(); ++i) {
     const PixelSample at = order.at(i);
     const CameraRay ray = camera.ray(at.x, at.y, random4(kSeed, at.y * width + at.x, 0, 0, Dimension::kPixel));
@@ -153,8 +153,8 @@ std::vector<BenchRay> RayWorkloads::primary_rays() const {
 }
 
 /// Where there are fewer hits than rays wanted, rays of one hit come after one another.
-std::vector<BenchRay> RayWorkloads::bounces(const std::vector<Ray>& hits, uint32_t bounce) const {
-  std::vector<BenchRay> rays(ray_count_);
+LargeVector<BenchRay> RayWorkloads::bounces(const std::vector<Ray>& hits, uint32_t bounce) const {
+  LargeVector<BenchRay> rays(ray_count_);
   for (uint64_t i = 0; i < rays.size(); ++i) {
     const Random4 random = random4(kSeed, static_cast<uint32_t>(i), 0, bounce, Dimension::kBsdf);
     rays[i] = cosine_ray(surface_at(scene_, hits[i * hits.size() / rays.size()]), random.uniform(0), random.uniform(1));
@@ -162,9 +162,9 @@ std::vector<BenchRay> RayWorkloads::bounces(const std::vector<Ray>& hits, uint32
   return rays;
 }
 
-std::vector<BenchRay> RayWorkloads::scene_random_rays() const {
+LargeVector<BenchRay> RayWorkloads::scene_random_rays() const {
   std::mt19937_64 random(kSeed);
-  std::vector<BenchRay> rays(ray_count_);
+  LargeVector<BenchRay> rays(ray_count_);
   for (uint64_t i = 0; i < rays.size(); ++i) {
     const uint64_t triangle = random() % mesh_.triangle_count();
     const Vec3 p0 = mesh_.position(triangle, 0), p1 = mesh_.position(triangle, 1), p2 = mesh_.position(triangle, 2);
@@ -181,8 +181,8 @@ std::vector<BenchRay> RayWorkloads::scene_random_rays() const {
   return rays;
 }
 
-std::vector<BenchRay> RayWorkloads::shadow_rays(const std::vector<Ray>& hits) const {
-  std::vector<BenchRay> rays;
+LargeVector<BenchRay> RayWorkloads::shadow_rays(const std::vector<Ray>& hits) const {
+  LargeVector<BenchRay> rays;
   rays.reserve(ray_count_);
   const EmitterPoints emitters(scene_.scene);
   for (uint64_t i = 0; i < ray_count_; ++i) {

@@ -31,12 +31,12 @@ class RayWorkloads {
   /// Kept, once they are known: rays with their hits.
   Result<const std::vector<Ray>*> primary_hits();
   Result<const std::vector<Ray>*> diffuse_hits();
-  std::vector<Ray> hits_of(const std::vector<BenchRay>& rays) const;
+  std::vector<Ray> hits_of(const LargeVector<BenchRay>& rays) const;
 
-  std::vector<BenchRay> primary_rays() const;
-  std::vector<BenchRay> bounces(const std::vector<Ray>& hits, uint32_t bounce) const;
-  std::vector<BenchRay> scene_random_rays() const;
-  std::vector<BenchRay> shadow_rays(const std::vector<Ray>& hits) const;
+  LargeVector<BenchRay> primary_rays() const;
+  LargeVector<BenchRay> bounces(const std::vector<Ray>& hits, uint32_t bounce) const;
+  LargeVector<BenchRay> scene_random_rays() const;
+  LargeVector<BenchRay> shadow_rays(const std::vector<Ray>& hits) const;
 
   const MemoryScene& scene_;
   const WorldMesh& mesh_;

@@ -41,7 +41,7 @@ void print_header() {
   fmt::print("{:<12} {:>2} {:>8} {:>5} {:<11}", "workload", "th", "rays", "hit", "best order");
   fmt::print("  | {:>7} {:>7} {:>7} | {:>7} {:>7} {:>7} {:>7} {:>7} | {:>7} |", "depth", "sorted", "queued", "default",
              "compact", "packet", "stream", "sorted", "bound");
-  fmt::print(" {:>7} {:>7} | {}\n", "/Embree", "/bound", "differ");
+  fmt::print(" {:>7} {:>7} | {:>6} {:>5}\n", "/Embree", "/bound", "differ", "CPU");
   std::fflush(stdout);
 }
 
@@ -52,8 +52,8 @@ void print_row(const RivalRow& row) {
              rate_columns({row.embree_default, row.embree_compact, row.embree_packet, row.embree_stream,
                            row.embree_sorted}),
              rate_columns({row.bound}));
-  fmt::print(" {:>7.2f} {:>7.2f} | {}\n", row.best_shoal() / row.embree_single(), row.best_shoal() / row.bound,
-             row.disagreeing);
+  fmt::print(" {:>7.2f} {:>7.2f} | {:>6} {:>5.2f}\n", row.best_shoal() / row.embree_single(),
+             row.best_shoal() / row.bound, row.disagreeing, row.cpu_share);
   std::fflush(stdout);
 }
 
@@ -79,6 +79,7 @@ nlohmann::ordered_json to_json(const RivalScene& scene, const RivalRow& row) {
       {"rays_count", row.rays},
       {"hits_count", row.hits},
       {"disagreeing_rays_count", row.disagreeing},
+      {"cpu_share", row.cpu_share},
       {"shoal_bytes_per_triangle", per(scene.shoal_bytes, scene.triangles)},
       {"embree_default_bytes_per_triangle", per(scene.embree_default_bytes, scene.triangles)},
       {"embree_compact_bytes_per_triangle", per(scene.embree_compact_bytes, scene.triangles)},
