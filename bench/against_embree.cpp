@@ -166,7 +166,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, QueueChoice>{{"sweep", QueueChoice::kSweep}, {"fullest", QueueChoice::kFullest}}));
   app.add_flag("--not-robust", arguments.not_robust, "Embree without its robust flag; ours stays watertight");
-  app.add_flag("--cpu-time", arguments.measure.cpu_time, "of the busiest thread, where others use the machine too");
+  app.add_flag("--cpu-time", arguments.measure.cpu_time, "mean of the threads, where others use the machine too");
   app.add_option("--folder", arguments.folder, "for what is generated and built")->capture_default_str();
   app.add_flag("--short", arguments.brief, "a small scene and few rays, to see that it works");
   app.add_option("--json", arguments.json, "the figures as JSON");

@@ -20,7 +20,7 @@ inline constexpr float kSameHitRoundings = 16;
 struct MeasureOptions {
   OrderOptions order;
   unsigned repeats = 3;
-  bool cpu_time = false;  ///< of the busiest thread, instead of wall time
+  bool cpu_time = false;  ///< TeamSeconds::cpu instead of wall time
 };
 
 /// Rates in million rays a second.
@@ -34,7 +34,7 @@ struct RivalRow {
   double embree_packet = 0, embree_stream = 0, embree_sorted = 0;  ///< over the faster of the two scenes
   uint64_t stream_rays = 0;  ///< a call, of the fastest stream
   double bound = 0;
-  double cpu_share = 0;  ///< CPU time of the busiest thread over wall time, all turns: below 1, others had the cores
+  double cpu_share = 0;  ///< CPU over wall time, all turns: below 1, others had the cores
   uint64_t disagreeing = 0;        ///< rays, of the program of Embree's that differs most from ours
   uint64_t orders_disagreeing = 0;  ///< rays whose answers our own orders do not give to the bit: a bug
 

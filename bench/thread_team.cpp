@@ -2,7 +2,7 @@
 
 #include <time.h>
 
-#include <algorithm>
+#include <numeric>
 #include <thread>
 #include <vector>
 
@@ -29,7 +29,7 @@ TeamSeconds run_together(unsigned threads, const std::function<void(unsigned)>& 
     for (unsigned thread = 1; thread < threads; ++thread) others.emplace_back(timed, thread);
     timed(0);
   }
-  return {now_seconds() - start, *std::max_element(cpu.begin(), cpu.end())};
+  return {now_seconds() - start, std::accumulate(cpu.begin(), cpu.end(), 0.0) / threads};
 }
 
 }  // namespace shoal::bench

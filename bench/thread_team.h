@@ -8,7 +8,7 @@ namespace shoal::bench {
 
 struct TeamSeconds {
   double wall = 0;  ///< from before the first thread begins to after the last one ends
-  double cpu = 0;   ///< of the thread that used most: what a machine shared with others does not disturb as much
+  double cpu = 0;   ///< mean of the threads: hardly disturbed by others on the machine, but blind to uneven shares
 };
 
 /// Runs `work(0)` .. `work(threads - 1)` at once, one of them on the calling thread.
