@@ -13,16 +13,32 @@ constexpr uint64_t kGroupRays = 64;
 constexpr uint64_t kMaxGroups = 2048;  // of the bound: a second or less
 constexpr uint64_t kFetchAhead = 8;    // sorted rays lie anywhere: asked for some rays before their turn
 
-/// What every order's thread counts, and adds once.
-struct ThreadCounts {
-  TraceCounters trace;
-  TraceCounts counts;
-
-  TraceCounts sum() const {
-    TraceCounts all = counts;
-    all.node_tests += trace.node_tests_count, all.triangle_tests += trace.triangle_tests_count;
-    return all;
+/// Traces rays to their ends, each by itself, several under way.
+class DepthFirstTracer {
+ public:
+  /// `more` gives the next ray, or returns false; `done` takes each ray at its end.
+  template <class More, class Done>
+  void trace(const MemoryScene& scene, const More& more, const Done& done) {
+    Ray ray;
+    bool left = true;
+    const auto decide = [&](uint32_t, const GroupRay& member, TreeletId treelet) -> const std::byte* {
+      if (treelet != kNoIndex) return scene.pages[treelet].data();
+      counts_.node_tests += member.node_tests, counts_.triangle_tests += member.triangle_tests;
+      done(member.ray);
+      return nullptr;
+    };
+    for (;;) {
+      while (left && !group_.full() && (left = more(ray))) group_.add(ray, nullptr);
+      if (group_.size() == 0) return;
+      counts_.treelet_visits += group_.step(scene.top_tree(), counters_, decide);
+    }
   }
+  const TraceCounts& counts() const { return counts_; }
+
+ private:
+  RayGroup group_;
+  TraceCounters counters_;
+  TraceCounts counts_;
 };
 
 /// Each ray to its end, in the order given or sorted first.
@@ -37,26 +53,29 @@ class DepthFirstOrder : public RayOrder {
     OrderRun result;
     result.seconds = run_together(threads_, [&](unsigned thread) {
       if (sorter_ != nullptr) sorter_->sort(set.rays, thread);
-      ThreadCounts counts;
+      const auto tracer = std::make_unique<DepthFirstTracer>();
       for (uint64_t first; (first = next.fetch_add(kRaysPerGrab)) < set.rays.size();) {
-        trace_range(set, first, std::min<uint64_t>(first + kRaysPerGrab, set.rays.size()), answers, counts);
+        trace_range(set, first, std::min<uint64_t>(first + kRaysPerGrab, set.rays.size()), answers, *tracer);
       }
       const std::lock_guard guard(mutex);
-      result.counts.add(counts.sum());
+      result.counts.add(tracer->counts());
     });
     return result;
   }
 
  private:
   void trace_range(const RaySet& set, uint64_t first, uint64_t last, std::span<RayAnswer> answers,
-                   ThreadCounts& counts) {
-    for (uint64_t place = first; place < last; ++place) {
+                   DepthFirstTracer& tracer) {
+    uint64_t place = first;
+    const auto more = [&](Ray& ray) {
+      if (place == last) return false;
       const uint64_t index = sorter_ != nullptr ? sorter_->ray_at(place) : place;
       if (sorter_ != nullptr) __builtin_prefetch(&set.rays[sorter_->ray_at(std::min(place + kFetchAhead, last - 1))]);
-      Ray ray = begin_ray(set.rays[index], static_cast<uint32_t>(index), set.any_hit);
-      trace_depth_first(scene_, ray, counts.trace, counts.counts.treelet_visits);
-      answers[index] = answer_of(ray);
-    }
+      ray = begin_ray(set.rays[index], static_cast<uint32_t>(index), set.any_hit);
+      ++place;
+      return true;
+    };
+    tracer.trace(scene_, more, [&](const Ray& ray) { answers[ray.path & ~Ray::kAnyHitBit] = answer_of(ray); });
   }
 
   const MemoryScene& scene_;
@@ -80,14 +99,15 @@ const char* name_of(MemoryOrder order) {
   return "";
 }
 
-void trace_depth_first(const MemoryScene& scene, Ray& ray, TraceCounters& counters, uint64_t& treelet_visits) {
+void trace_to_end(const MemoryScene& scene, Ray& ray) {
   const TopTree& tree = scene.top_tree();
   RayContext context;
-  for (uint32_t index; (index = tree.next(ray, context, counters.node_tests_count)) != kNoIndex;) {
+  TraceCounters counters;
+  while (!(ray.any_hit() && ray.hit.valid())) {
+    const uint32_t index = tree.next(ray, context, counters.node_tests_count);
+    if (index == kNoIndex) return;
     const TreeletEntry& entry = tree.entry(index);
     trace_treelet(scene.pages[entry.treelet], entry, tree.instance(ray.instance), ray, context, counters);
-    ++treelet_visits;
-    if (ray.any_hit() && ray.hit.valid()) return;
   }
 }
 
@@ -107,15 +127,17 @@ double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsign
   if (sampled == 0) return 0;
   std::vector<double> seconds(threads);
   run_together(threads, [&](unsigned thread) {
-    TraceCounters counters;
-    uint64_t visits = 0;
+    const auto tracer = std::make_unique<DepthFirstTracer>();
     float kept = 0;  // so that no pass is left out
     const auto trace_group = [&](uint64_t group) {
-      for (uint64_t i = group * kGroupRays; i < (group + 1) * kGroupRays; ++i) {
-        Ray ray = begin_ray(set.rays[i], static_cast<uint32_t>(i), set.any_hit);
-        trace_depth_first(scene, ray, counters, visits);
-        kept += answer_of(ray).t;
-      }
+      uint64_t i = group * kGroupRays;
+      const auto more = [&](Ray& ray) {
+        if (i == (group + 1) * kGroupRays) return false;
+        ray = begin_ray(set.rays[i], static_cast<uint32_t>(i), set.any_hit);
+        ++i;
+        return true;
+      };
+      tracer->trace(scene, more, [&](const Ray& ray) { kept += answer_of(ray).t; });
     };
     const auto clock = cpu_time ? thread_cpu_seconds : now_seconds;
     for (uint64_t i = thread; i < sampled; i += threads) {

@@ -9,8 +9,7 @@
 
 #include "bench/memory_scene.h"
 #include "bench/thread_team.h"
-#include "treelets/ray_space.h"
-#include "treelets/trace_treelet.h"
+#include "engine/ray_group.h"
 
 namespace shoal::bench {
 
@@ -89,11 +88,11 @@ inline RayAnswer answer_of(const Ray& ray) {
   return {ray.any_hit() ? 0 : ray.t, ray.hit.primitive};
 }
 
-/// The ray to its end, through every treelet on its way.
-void trace_depth_first(const MemoryScene& scene, Ray& ray, TraceCounters& counters, uint64_t& treelet_visits);
+/// One ray through every treelet on its way: to make rays from its hit, not to be timed.
+void trace_to_end(const MemoryScene& scene, Ray& ray);
 
 /// How fast these rays could go if everything they touch were in the core's own caches: rays a second of the second
-/// pass over groups of consecutive rays, each group traced twice in a row, depth-first. Assumes that a group's nodes
+/// pass over groups of consecutive rays, each group traced twice in a row, depth-first by the same kernels. Assumes that a group's nodes
 /// and leaves fit in L1 and L2; flatters a little, since the branch predictors, too, have seen the group once. Groups
 /// are spread evenly over the rays. By CPU time where `cpu_time`.
 double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsigned threads, bool cpu_time);

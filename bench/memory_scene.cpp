@@ -92,7 +92,7 @@ void append_triangles(const TreeletView& view, const Instance& instance, VertexT
         mesh.indices.push_back(vertices.index_of(instance.identity != 0 ? p : instance.object_to_world.point(p)));
       }
     }
-    offset += leaf_bytes(leaf.triangle_count, leaf.vertex_count);
+    offset += leaf.bytes();
   }
 }
 

@@ -95,7 +95,7 @@ class QueuedThread {
   /// All queues are empty before and after.
   TraceCounts run() {
     free_.clear();
-    trace_counters_ = {}, counts_ = {};
+    counts_ = {};
     cursor_ = first_;
     while (!ended()) {
       while (admit()) {
@@ -107,8 +107,6 @@ class QueuedThread {
         std::this_thread::yield();
       }
     }
-    counts_.node_tests = trace_counters_.node_tests_count;
-    counts_.triangle_tests = trace_counters_.triangle_tests_count;
     return counts_;
   }
 
@@ -128,11 +126,13 @@ class QueuedThread {
     const uint64_t first = context_.next_ray.fetch_add(kRaysPerGrab);
     const uint64_t last = std::min<uint64_t>(std::max<uint64_t>(first, rays.size()), first + kRaysPerGrab);
     done_ = kRaysPerGrab - (last - first);
-    for (uint64_t i = first; i < last; ++i) {
-      Ray ray = begin_ray(rays[i], static_cast<uint32_t>(i), context_.set->any_hit);
-      ray_context_.reset();
-      route(ray, kNoIndex);
-    }
+    uint64_t i = first;
+    travel(kNoIndex, [&] {
+      if (i == last) return false;
+      group_.add(begin_ray(rays[i], static_cast<uint32_t>(i), context_.set->any_hit), nullptr);
+      ++i;
+      return true;
+    });
     context_.in_flight -= done_;
     return true;
   }
@@ -163,47 +163,56 @@ class QueuedThread {
     uint32_t block = queue.head.load(std::memory_order_relaxed) == kNoIndex
                          ? kNoIndex
                          : queue.head.exchange(kNoIndex, std::memory_order_acquire);
-    while (block != kNoIndex) {
-      const uint32_t next = context_.store.next[block];
-      queue.blocks.fetch_sub(1, std::memory_order_relaxed);
-      drain_block(treelet, block, kBlockRays);
-      block = next;
-    }
     const OpenBlock own = open_[treelet];
     open_[treelet] = {};
-    if (own.block != kNoIndex) drain_block(treelet, own.block, own.count);
+    uint32_t count = kBlockRays, next = 0;
+    if (block == kNoIndex) block = own.block, count = own.count;
+    const std::byte* page = context_.scene.pages[treelet].data();
+    travel(treelet, [&] {
+      if (block == kNoIndex) return false;
+      group_.add(context_.store.blocks[block].rays[next++], page);
+      if (next < count) return true;
+      const uint32_t used = block;
+      next = 0;
+      if (block == own.block) {
+        block = kNoIndex;
+      } else {
+        block = context_.store.next[used];
+        queue.blocks.fetch_sub(1, std::memory_order_relaxed);
+        if (block == kNoIndex) block = own.block, count = own.count;
+      }
+      give_back(used);
+      return true;
+    });
     context_.in_flight -= done_;
   }
 
-  void drain_block(TreeletId treelet, uint32_t block, uint32_t count) {
-    const Ray* rays = context_.store.blocks[block].rays;
-    for (uint32_t i = 0; i < count; ++i) {
-      Ray ray = rays[i];
-      ray_context_.reset();
-      trace(ray, treelet, tree_.current(ray));
-      route(ray, treelet);
-    }
+  void give_back(uint32_t block) {
     free_.push_back(block);
     if (free_.size() >= 2 * kChainBlocks) context_.store.give(free_);
   }
 
-  void trace(Ray& ray, TreeletId treelet, const TreeletEntry& entry) {
-    trace_treelet(context_.scene.pages[treelet], entry, tree_.instance(ray.instance), ray, ray_context_,
-                  trace_counters_);
-    ++counts_.treelet_visits;
-  }
-
-  /// To the ray's answer, or to the queue of the first treelet that is not in hand.
-  void route(Ray& ray, TreeletId in_hand) {
-    while (!(ray.any_hit() && ray.hit.valid())) {
-      const uint32_t index = tree_.next(ray, ray_context_, trace_counters_.node_tests_count);
-      if (index == kNoIndex) break;
-      const TreeletEntry& entry = tree_.entry(index);
-      if (entry.treelet != in_hand) return push(entry.treelet, ray);
-      trace(ray, in_hand, entry);
+  /// Keeps the group full with what `more` adds to it until there is no more, and every ray has gone elsewhere.
+  template <class More>
+  void travel(TreeletId in_hand, const More& more) {
+    const std::byte* page = in_hand == kNoIndex ? nullptr : context_.scene.pages[in_hand].data();
+    const auto decide = [&](uint32_t, const GroupRay& member, TreeletId treelet) -> const std::byte* {
+      if (treelet != kNoIndex && treelet == in_hand) return page;
+      counts_.node_tests += member.node_tests, counts_.triangle_tests += member.triangle_tests;
+      if (treelet != kNoIndex) {
+        push(treelet, member.ray);
+      } else {
+        context_.answers[member.ray.path & ~Ray::kAnyHitBit] = answer_of(member.ray);
+        ++done_;
+      }
+      return nullptr;
+    };
+    for (bool left = true;;) {
+      while (left && !group_.full() && (left = more())) {
+      }
+      if (group_.size() == 0) return;
+      counts_.treelet_visits += group_.step(tree_, trace_counters_, decide);
     }
-    context_.answers[ray.path & ~Ray::kAnyHitBit] = answer_of(ray);
-    ++done_;
   }
 
   void push(TreeletId treelet, const Ray& ray) {
@@ -231,7 +240,7 @@ class QueuedThread {
   const TopTree& tree_;
   std::vector<OpenBlock> open_;  ///< by treelet
   std::vector<uint32_t> free_;
-  RayContext ray_context_;
+  RayGroup group_;
   TraceCounters trace_counters_;
   TraceCounts counts_;
   uint64_t done_ = 0;  ///< rays of this drain, or of this admission, whose answer is known

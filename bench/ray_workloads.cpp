@@ -124,12 +124,10 @@ std::vector<Ray> RayWorkloads::hits_of(const LargeVector<BenchRay>& rays) const 
   std::vector<Ray> traced(rays.size());
   std::atomic<uint64_t> next{0};
   run_together(threads_, [&](unsigned) {
-    TraceCounters counters;
-    uint64_t visits = 0;
     for (uint64_t first; (first = next.fetch_add(kRaysPerGrab)) < rays.size();) {
       for (uint64_t i = first; i < std::min<uint64_t>(first + kRaysPerGrab, rays.size()); ++i) {
         traced[i] = begin_ray(rays[i], static_cast<uint32_t>(i), false);
-        trace_depth_first(scene_, traced[i], counters, visits);
+        trace_to_end(scene_, traced[i]);
       }
     }
   });
