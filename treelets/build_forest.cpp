@@ -21,31 +21,6 @@
 namespace shoal {
 namespace {
 
-constexpr size_t kChunkTriangles = 1u << 14;
-
-// References to the triangles that are stored, in the order of the soup.
-std::vector<BuildRef> make_refs(const TriangleSoup& soup) {
-  const size_t count = soup.size(), chunk_count = (count + kChunkTriangles - 1) / kChunkTriangles;
-  std::vector<size_t> begin(chunk_count + 1, 0);
-  const auto for_each_stored = [&](size_t chunk, auto visit) {
-    const size_t end = std::min(count, (chunk + 1) * kChunkTriangles);
-    for (size_t i = chunk * kChunkTriangles; i < end; ++i) {
-      if (!is_degenerate(&soup.positions[9 * i])) visit(i);
-    }
-  };
-  tbb::parallel_for(size_t{0}, chunk_count,
-                    [&](size_t chunk) { for_each_stored(chunk, [&](size_t) { ++begin[chunk + 1]; }); });
-  for (size_t chunk = 0; chunk < chunk_count; ++chunk) begin[chunk + 1] += begin[chunk];
-  std::vector<BuildRef> refs(begin[chunk_count]);
-  tbb::parallel_for(size_t{0}, chunk_count, [&](size_t chunk) {
-    size_t next = begin[chunk];
-    for_each_stored(chunk, [&](size_t i) {
-      refs[next++] = make_triangle_ref(&soup.positions[9 * i], static_cast<uint32_t>(i));
-    });
-  });
-  return refs;
-}
-
 // References sorted by part, in the order of the soup within each; begin[p] is the first of part p.
 std::vector<BuildRef> make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> part_of,
                                         uint32_t part_count, std::vector<uint32_t>& begin) {
@@ -271,7 +246,7 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
   std::vector<uint32_t> begin;
   std::vector<BuildRef> refs;
   if (part_count == 1) {
-    refs = make_refs(soup);
+    refs = make_refs(soup.positions);
     begin = {0, static_cast<uint32_t>(refs.size())};
   } else {
     refs = make_refs_by_part(soup, part_of, part_count, begin);

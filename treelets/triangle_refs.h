@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "treelets/binned_sah.h"
 
@@ -35,5 +37,8 @@ inline BuildRef make_triangle_ref(const float* p, uint32_t triangle) {
   }
   return ref;
 }
+
+/// References to the triangles that are not degenerate, in order; `positions`: nine floats a triangle. Parallel inside.
+std::vector<BuildRef> make_refs(std::span<const float> positions);
 
 }  // namespace shoal

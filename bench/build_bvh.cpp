@@ -1,0 +1,207 @@
+// bench/build_bvh: our in-memory stage of building beside Embree's rtcBuildBVH of the same references, on as many threads,
+// turn by turn. Ours: references to the binary tree, which of its nodes become nodes of 8 children, and those written;
+// treelets are cut and packed after that. Embree's: medium quality, branching 8, the same largest leaf. Both write the same
+// nodes (bench/wide_bvh); making references from triangles is the same work for both and stands on a line of its own.
+//
+//   bench/build_bvh [--triangles N] [--gltf F.gltf] [--threads 1,2] [--blocks 1,8] [--repeats N] [--short] [--json F]
+#include <embree3/rtcore.h>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "bench/load_triangles.h"
+#include "bench/wide_bvh.h"
+#include "engine/clock.h"
+#include "io/file.h"
+#include "treelets/treelet_layout.h"
+#include "treelets/triangle_refs.h"
+
+namespace {
+
+using namespace shoal;
+using namespace shoal::bench;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  uint64_t triangles = 1'000'000;
+  std::string gltf, folder = std::filesystem::temp_directory_path().string(), json;
+  std::vector<unsigned> threads{1, 2};
+  std::vector<uint32_t> blocks{1, kMaxLeafTriangles};  ///< of Embree: triangles that one test is expected to take
+  int repeats = 3;
+  bool brief = false;
+};
+
+[[noreturn]] void stop(const Error& error) {
+  fmt::print(stderr, "build_bvh: {}\n", error.message);
+  std::exit(static_cast<int>(error.code));
+}
+
+template <class T>
+T value_or_stop(Result<T> result) {
+  if (!result.ok()) stop(result.error());
+  return std::move(result).value();
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// One builder with one setting: what its turns took, and what came out.
+struct Row {
+  std::string name;
+  uint32_t block = 0;  ///< of Embree's; 0: ours
+  std::vector<double> seconds, cpu_seconds, tree_seconds, plan_seconds, store_seconds;
+  WideCost cost;
+
+  void add(const Spent& spent) {
+    seconds.push_back(spent.seconds);
+    cpu_seconds.push_back(spent.cpu_seconds);
+  }
+};
+
+struct Table {
+  unsigned threads;
+  double refs_seconds;
+  std::vector<Row> rows;  ///< ours first
+};
+
+void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
+  if (row.block == 0) {
+    const OurBvh bvh(std::move(refs), kMaxLeafTriangles);
+    row.add(bvh.spent());
+    row.tree_seconds.push_back(bvh.tree_seconds());
+    row.plan_seconds.push_back(bvh.plan_seconds());
+    row.store_seconds.push_back(bvh.store_seconds());
+    if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), kMaxLeafTriangles);
+    return;
+  }
+  std::vector<RTCBuildPrimitive> primitives = primitives_of(refs);
+  refs = {};
+  const EmbreeBvh bvh(device, std::move(primitives), {kMaxLeafTriangles, row.block});
+  if (bvh.root() == 0) stop({ErrorCode::kInternal, "rtcBuildBVH failed"});
+  row.add(bvh.spent());
+  if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), kMaxLeafTriangles);
+}
+
+Table measure(const Arguments& arguments, const std::vector<float>& positions, unsigned threads) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+  RTCDevice device = rtcNewDevice(fmt::format("threads={},set_affinity=0", threads).c_str());
+  Table table{threads, 0, {{"ours", 0, {}, {}, {}, {}, {}, {}}}};
+  for (const uint32_t block : arguments.blocks) {
+    table.rows.push_back({fmt::format("Embree, blocks of {}", block), block, {}, {}, {}, {}, {}, {}});
+  }
+  std::vector<double> refs_seconds;
+  for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
+    const double start = now_seconds();
+    const std::vector<BuildRef> refs = make_refs(positions);
+    refs_seconds.push_back(now_seconds() - start);
+    for (Row& row : table.rows) run_turn(row, device, refs);
+  }
+  table.refs_seconds = median(refs_seconds);
+  rtcReleaseDevice(device);
+  return table;
+}
+
+void print_table(const Table& table) {
+  fmt::print("\n{} thread{}; references from triangles, for either: {:.3f} s\n", table.threads,
+             table.threads == 1 ? "" : "s", table.refs_seconds);
+  fmt::print("{:<22} {:>8} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>7} {:>10} {:>7}\n", "", "seconds", "cpu", "M/s",
+             "rate", "nodes", "leaves", "by leaves", "ratio", "by triang.", "ratio");
+  const Row& ours = table.rows[0];
+  for (const Row& row : table.rows) {
+    const double seconds = median(row.seconds);
+    fmt::print("{:<22} {:>8.3f} {:>8.3f} {:>7.3f} {:>7.3f} {:>10} {:>10} {:>10.3f} {:>7.3f} {:>10.3f} {:>7.3f}\n",
+               row.name, seconds, median(row.cpu_seconds),
+               static_cast<double>(row.cost.triangles_count) * 1e-6 / seconds, seconds / median(ours.seconds),
+               row.cost.nodes_count, row.cost.leaves_count, row.cost.by_leaves,
+               ours.cost.by_leaves / row.cost.by_leaves, row.cost.by_triangles,
+               ours.cost.by_triangles / row.cost.by_triangles);
+  }
+  fmt::print("ours: binary tree {:.3f}, choice of wide nodes {:.3f}, writing them {:.3f} s\n",
+             median(ours.tree_seconds), median(ours.plan_seconds), median(ours.store_seconds));
+}
+
+Json table_json(const Table& table) {
+  Json rows = Json::array();
+  for (const Row& row : table.rows) {
+    Json json = {{"builder", row.name},
+                 {"seconds", row.seconds},
+                 {"median_seconds", median(row.seconds)},
+                 {"median_cpu_seconds", median(row.cpu_seconds)},
+                 {"nodes_count", row.cost.nodes_count},
+                 {"leaves_count", row.cost.leaves_count},
+                 {"cost_by_leaves", row.cost.by_leaves},
+                 {"cost_by_triangles", row.cost.by_triangles},
+                 {"our_rate_over_this", median(row.seconds) / median(table.rows[0].seconds)},
+                 {"our_cost_over_this_by_leaves", table.rows[0].cost.by_leaves / row.cost.by_leaves},
+                 {"our_cost_over_this_by_triangles", table.rows[0].cost.by_triangles / row.cost.by_triangles}};
+    if (row.block == 0) {
+      json["median_tree_seconds"] = median(row.tree_seconds);
+      json["median_plan_seconds"] = median(row.plan_seconds);
+      json["median_store_seconds"] = median(row.store_seconds);
+    }
+    rows.push_back(std::move(json));
+  }
+  return {{"threads_count", table.threads}, {"refs_seconds", table.refs_seconds}, {"rows", std::move(rows)}};
+}
+
+int run(const Arguments& arguments) {
+  const std::filesystem::path folder = arguments.folder + fmt::format("/shoal-build-bvh-{}", ::getpid());
+  const std::string gltf =
+      arguments.gltf.empty() ? value_or_stop(generate_terrain(folder.string(), arguments.triangles)) : arguments.gltf;
+  const std::vector<float> positions = corner_positions(value_or_stop(read_triangles(gltf)));
+  std::error_code code;
+  std::filesystem::remove_all(folder, code);
+  if (make_refs(positions).empty()) stop({ErrorCode::kInput, gltf + ": no triangles"});
+  fmt::print("{}: {:.2f} M triangles, leaves of at most {}; median of {}. Costs: a node 1; a leaf 1 for each {} of its "
+             "triangles begun (by leaves), or its triangles (by triangles). rate: ours over theirs; ratio: our cost over "
+             "theirs.\n",
+             gltf, static_cast<double>(positions.size()) / 9e6, kMaxLeafTriangles, arguments.repeats, kMaxLeafTriangles);
+  Json tables = Json::array();
+  for (const unsigned threads : arguments.threads) {
+    const Table table = measure(arguments, positions, threads);
+    print_table(table);
+    tables.push_back(table_json(table));
+  }
+  if (arguments.json.empty()) return 0;
+  const Json json = {{"triangles_count", positions.size() / 9}, {"tables", std::move(tables)}};
+  const std::string text = json.dump(1) + "\n";
+  const Status written = write_whole_file(posix_file_system(), arguments.json, std::as_bytes(std::span(text)));
+  if (!written.ok()) stop(written.error());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Building in memory: our binned-SAH tree of 8 children a node beside Embree's", "build_bvh"};
+  app.add_option("--triangles", arguments.triangles, "of the generated terrain, such as 10M")
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, uint64_t>{{"K", 1000}, {"M", 1000000}, {"G", 1000000000}}))
+      ->capture_default_str();
+  app.add_option("--gltf", arguments.gltf, "built in place of the terrain");
+  app.add_option("--threads", arguments.threads, "numbers of threads, one table each")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app.add_option("--blocks", arguments.blocks, "Embree's sahBlockSize, one row each")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str();
+  app.add_option("--repeats", arguments.repeats, "turns of each builder")->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_option("--folder", arguments.folder, "for the generated terrain")->capture_default_str();
+  app.add_flag("--short", arguments.brief, "a small scene and one turn, to see that it works");
+  app.add_option("--json", arguments.json, "the figures as JSON");
+  CLI11_PARSE(app, argc, argv);
+  if (arguments.brief) arguments.triangles = 50'000, arguments.repeats = 1;
+  return run(arguments);
+}
