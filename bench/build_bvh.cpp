@@ -75,7 +75,7 @@ struct Table {
 
 void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
   if (row.block == 0) {
-    const OurBvh bvh(std::move(refs), kMaxLeafTriangles);
+    const OurBvh bvh(std::move(refs), {kMaxLeafTriangles});
     row.add(bvh.spent());
     row.tree_seconds.push_back(bvh.tree_seconds());
     row.plan_seconds.push_back(bvh.plan_seconds());

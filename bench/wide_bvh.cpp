@@ -173,10 +173,10 @@ class OurBvh::Arenas {
   tbb::enumerable_thread_specific<Arena> arenas_;
 };
 
-OurBvh::OurBvh(std::vector<BuildRef>&& refs, uint32_t leaf_size) : arenas_(std::make_unique<Arenas>()) {
+OurBvh::OurBvh(std::vector<BuildRef>&& refs, const SahModel& model) : arenas_(std::make_unique<Arenas>()) {
   const Stopwatch watch;
   {
-    const std::vector<BinaryNode> tree = build_binary_tree(refs, leaf_size);
+    const std::vector<BinaryNode> tree = build_binary_tree(refs, model);
     tree_seconds_ = watch.spent().seconds;
     const WidePlan plan(tree);
     plan_seconds_ = watch.spent().seconds - tree_seconds_;

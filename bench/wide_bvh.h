@@ -71,7 +71,7 @@ class EmbreeBvh {
 /// Our builder. Consumes the references.
 class OurBvh {
  public:
-  OurBvh(std::vector<BuildRef>&& refs, uint32_t leaf_size);
+  OurBvh(std::vector<BuildRef>&& refs, const SahModel& model);
   ~OurBvh();
 
   uintptr_t root() const { return root_; }

@@ -44,7 +44,7 @@ class ForestTree {
     roots_.resize(parts);
     if (parts == 1) {
       roots_[0] = 0;
-      nodes_ = build_binary_tree(refs, kMaxLeafTriangles);
+      nodes_ = build_binary_tree(refs, {kMaxLeafTriangles});
       return;
     }
     nodes_.reserve(2 * refs.size());  // what is never written takes no memory
@@ -77,7 +77,7 @@ class ForestTree {
 
   void add_part(uint32_t p) {
     const std::vector<BinaryNode> tree =
-        build_binary_tree(refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), kMaxLeafTriangles);
+        build_binary_tree(refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), {kMaxLeafTriangles});
     const auto shift = static_cast<uint32_t>(nodes_.size() - 1);
     for (size_t i = 0; i < tree.size(); ++i) {
       BinaryNode node = tree[i];
