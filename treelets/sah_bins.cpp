@@ -55,14 +55,20 @@ SahBins::SahBins(uint32_t bin_count) : bin_count_(bin_count) {
 }
 
 void SahBins::add(std::span<const BuildRef> refs, const Binning& binning) {
-  for (const BuildRef& ref : refs) {
-    int32_t bin[4];
-    binning.bins_of(ref, bin);
-    const Lanes lo = lanes_load3(ref.lo), hi = lanes_load3(ref.hi);
-    for (int axis = 0; axis < 3; ++axis) {
-      Box& box = box_[bin[axis]][axis];
-      box.lo = lanes_min(lo, box.lo), box.hi = lanes_max(hi, box.hi);
-      ++count_[bin[axis]][axis];
+  // Bins of a few references first: were they found one by one, each box would wait for where the one before goes.
+  constexpr size_t kAtOnce = 32;
+  alignas(16) int32_t bin[kAtOnce][4];
+  for (size_t first = 0; first < refs.size(); first += kAtOnce) {
+    const size_t count = std::min(kAtOnce, refs.size() - first);
+    for (size_t i = 0; i < count; ++i) binning.bins_of(refs[first + i], bin[i]);
+    for (size_t i = 0; i < count; ++i) {
+      const Lanes lo = lanes_load3(refs[first + i].lo), hi = lanes_load3(refs[first + i].hi);
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto at = static_cast<uint32_t>(bin[i][axis]);
+        Box& box = box_[at][axis];
+        box.lo = lanes_min(lo, box.lo), box.hi = lanes_max(hi, box.hi);
+        ++count_[at][axis];
+      }
     }
   }
 }
