@@ -33,7 +33,7 @@ struct Arguments {
   uint64_t triangles = 1'000'000;
   std::string gltf, folder = std::filesystem::temp_directory_path().string(), json;
   std::vector<unsigned> threads{1, 2};
-  std::vector<uint32_t> blocks{1, kMaxLeafTriangles};  ///< of Embree: triangles that one test is expected to take
+  std::vector<uint32_t> blocks{1, kMaxLeafTriangles};  ///< triangles that one test is expected to take
   int repeats = 3;
   bool brief = false;
 };
@@ -56,8 +56,8 @@ double median(std::vector<double> values) {
 
 /// One builder with one setting: what its turns took, and what came out.
 struct Row {
-  std::string name;
-  uint32_t block = 0;  ///< of Embree's; 0: ours
+  bool ours = false;
+  uint32_t block = 1;
   std::vector<double> seconds, cpu_seconds, tree_seconds, plan_seconds, store_seconds;
   WideCost cost;
 
@@ -70,17 +70,22 @@ struct Row {
 struct Table {
   unsigned threads;
   double refs_seconds;
-  std::vector<Row> rows;  ///< ours first
+  std::vector<Row> rows;  ///< ours and Embree's by turns
 };
 
+/// Blocks of a whole leaf: as `shoal build` builds; others: with Embree's costs.
+SahModel model_of(uint32_t block) {
+  return block == kMaxLeafTriangles ? SahModel{kMaxLeafTriangles} : SahModel{kMaxLeafTriangles, block, 1};
+}
+
 void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
-  if (row.block == 0) {
-    const OurBvh bvh(std::move(refs), {kMaxLeafTriangles});
+  if (row.ours) {
+    const OurBvh bvh(std::move(refs), model_of(row.block));
     row.add(bvh.spent());
     row.tree_seconds.push_back(bvh.tree_seconds());
     row.plan_seconds.push_back(bvh.plan_seconds());
     row.store_seconds.push_back(bvh.store_seconds());
-    if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), kMaxLeafTriangles);
+    if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), row.block);
     return;
   }
   std::vector<RTCBuildPrimitive> primitives = primitives_of(refs);
@@ -88,15 +93,15 @@ void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
   const EmbreeBvh bvh(device, std::move(primitives), {kMaxLeafTriangles, row.block});
   if (bvh.root() == 0) stop({ErrorCode::kInternal, "rtcBuildBVH failed"});
   row.add(bvh.spent());
-  if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), kMaxLeafTriangles);
+  if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), row.block);
 }
 
 Table measure(const Arguments& arguments, const std::vector<float>& positions, unsigned threads) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   RTCDevice device = rtcNewDevice(fmt::format("threads={},set_affinity=0", threads).c_str());
-  Table table{threads, 0, {{"ours", 0, {}, {}, {}, {}, {}, {}}}};
+  Table table{threads, 0, {}};
   for (const uint32_t block : arguments.blocks) {
-    table.rows.push_back({fmt::format("Embree, blocks of {}", block), block, {}, {}, {}, {}, {}, {}});
+    for (const bool ours : {true, false}) table.rows.emplace_back().ours = ours, table.rows.back().block = block;
   }
   std::vector<double> refs_seconds;
   for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
@@ -110,45 +115,59 @@ Table measure(const Arguments& arguments, const std::vector<float>& positions, u
   return table;
 }
 
+void print_row(const Row& row) {
+  const double seconds = median(row.seconds);
+  fmt::print("{:>5}  {:<12} {:>8.3f} {:>8.3f} {:>7.3f} {:>10} {:>10} {:>8.3f}", row.block,
+             row.ours ? "ours" : "rtcBuildBVH", seconds, median(row.cpu_seconds),
+             static_cast<double>(row.cost.triangles_count) * 1e-6 / seconds, row.cost.nodes_count,
+             row.cost.leaves_count, row.cost.tests);
+}
+
+double rate(const Row& ours, const Row& theirs) { return median(theirs.seconds) / median(ours.seconds); }
+double cpu_rate(const Row& ours, const Row& theirs) { return median(theirs.cpu_seconds) / median(ours.cpu_seconds); }
+
 void print_table(const Table& table) {
   fmt::print("\n{} thread{}; references from triangles, for either: {:.3f} s\n", table.threads,
              table.threads == 1 ? "" : "s", table.refs_seconds);
-  fmt::print("{:<22} {:>8} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>7} {:>10} {:>7}\n", "", "seconds", "cpu", "M/s",
-             "rate", "nodes", "leaves", "by leaves", "ratio", "by triang.", "ratio");
-  const Row& ours = table.rows[0];
-  for (const Row& row : table.rows) {
-    const double seconds = median(row.seconds);
-    fmt::print("{:<22} {:>8.3f} {:>8.3f} {:>7.3f} {:>7.3f} {:>10} {:>10} {:>10.3f} {:>7.3f} {:>10.3f} {:>7.3f}\n",
-               row.name, seconds, median(row.cpu_seconds),
-               static_cast<double>(row.cost.triangles_count) * 1e-6 / seconds, seconds / median(ours.seconds),
-               row.cost.nodes_count, row.cost.leaves_count, row.cost.by_leaves,
-               ours.cost.by_leaves / row.cost.by_leaves, row.cost.by_triangles,
-               ours.cost.by_triangles / row.cost.by_triangles);
+  fmt::print("{:<5}  {:<12} {:>8} {:>8} {:>7} {:>10} {:>10} {:>8}\n", "block", "", "seconds", "cpu", "M/s", "nodes",
+             "leaves", "cost");
+  for (size_t i = 0; i < table.rows.size(); i += 2) {
+    const Row &ours = table.rows[i], &theirs = table.rows[i + 1];
+    print_row(ours);
+    fmt::print("  (tree {:.3f}, choice of wide nodes {:.3f}, writing them {:.3f} s)\n", median(ours.tree_seconds),
+               median(ours.plan_seconds), median(ours.store_seconds));
+    print_row(theirs);
+    fmt::print("  ours over this: rate {:.2f} (by cpu {:.2f}), cost {:.3f}\n", rate(ours, theirs),
+               cpu_rate(ours, theirs), ours.cost.tests / theirs.cost.tests);
   }
-  fmt::print("ours: binary tree {:.3f}, choice of wide nodes {:.3f}, writing them {:.3f} s\n",
-             median(ours.tree_seconds), median(ours.plan_seconds), median(ours.store_seconds));
+}
+
+Json row_json(const Row& row) {
+  Json json = {{"builder", row.ours ? "ours" : "rtcBuildBVH"},
+               {"block", row.block},
+               {"seconds", row.seconds},
+               {"median_seconds", median(row.seconds)},
+               {"median_cpu_seconds", median(row.cpu_seconds)},
+               {"nodes_count", row.cost.nodes_count},
+               {"leaves_count", row.cost.leaves_count},
+               {"sah_cost", row.cost.tests}};
+  if (row.ours) {
+    json["median_tree_seconds"] = median(row.tree_seconds);
+    json["median_plan_seconds"] = median(row.plan_seconds);
+    json["median_store_seconds"] = median(row.store_seconds);
+  }
+  return json;
 }
 
 Json table_json(const Table& table) {
   Json rows = Json::array();
-  for (const Row& row : table.rows) {
-    Json json = {{"builder", row.name},
-                 {"seconds", row.seconds},
-                 {"median_seconds", median(row.seconds)},
-                 {"median_cpu_seconds", median(row.cpu_seconds)},
-                 {"nodes_count", row.cost.nodes_count},
-                 {"leaves_count", row.cost.leaves_count},
-                 {"cost_by_leaves", row.cost.by_leaves},
-                 {"cost_by_triangles", row.cost.by_triangles},
-                 {"our_rate_over_this", median(row.seconds) / median(table.rows[0].seconds)},
-                 {"our_cost_over_this_by_leaves", table.rows[0].cost.by_leaves / row.cost.by_leaves},
-                 {"our_cost_over_this_by_triangles", table.rows[0].cost.by_triangles / row.cost.by_triangles}};
-    if (row.block == 0) {
-      json["median_tree_seconds"] = median(row.tree_seconds);
-      json["median_plan_seconds"] = median(row.plan_seconds);
-      json["median_store_seconds"] = median(row.store_seconds);
-    }
-    rows.push_back(std::move(json));
+  for (size_t i = 0; i < table.rows.size(); i += 2) {
+    const Row &ours = table.rows[i], &theirs = table.rows[i + 1];
+    rows.push_back(row_json(ours));
+    rows.push_back(row_json(theirs));
+    rows.back()["our_rate_over_this"] = rate(ours, theirs);
+    rows.back()["our_cpu_rate_over_this"] = cpu_rate(ours, theirs);
+    rows.back()["our_sah_cost_over_this"] = ours.cost.tests / theirs.cost.tests;
   }
   return {{"threads_count", table.threads}, {"refs_seconds", table.refs_seconds}, {"rows", std::move(rows)}};
 }
@@ -161,10 +180,10 @@ int run(const Arguments& arguments) {
   std::error_code code;
   std::filesystem::remove_all(folder, code);
   if (make_refs(positions).empty()) stop({ErrorCode::kInput, gltf + ": no triangles"});
-  fmt::print("{}: {:.2f} M triangles, leaves of at most {}; median of {}. Costs: a node 1; a leaf 1 for each {} of its "
-             "triangles begun (by leaves), or its triangles (by triangles). rate: ours over theirs; ratio: our cost over "
-             "theirs.\n",
-             gltf, static_cast<double>(positions.size()) / 9e6, kMaxLeafTriangles, arguments.repeats, kMaxLeafTriangles);
+  fmt::print("{}: {:.2f} M triangles, leaves of at most {}; median of {}. SAH cost: areas over the root's, of nodes and, "
+             "for each {}, of leaves.\n",
+             gltf, static_cast<double>(positions.size()) / 9e6, kMaxLeafTriangles, arguments.repeats,
+             "`block` of their triangles begun");
   Json tables = Json::array();
   for (const unsigned threads : arguments.threads) {
     const Table table = measure(arguments, positions, threads);
@@ -193,9 +212,9 @@ int main(int argc, char** argv) {
       ->delimiter(',')
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  app.add_option("--blocks", arguments.blocks, "Embree's sahBlockSize, one row each")
+  app.add_option("--blocks", arguments.blocks, "triangles that a test is expected to take, of both builders")
       ->delimiter(',')
-      ->check(CLI::Range(1, 32))
+      ->check(CLI::IsMember({1, 2, 4, 8, 16, 32}))
       ->capture_default_str();
   app.add_option("--repeats", arguments.repeats, "turns of each builder")->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--folder", arguments.folder, "for the generated terrain")->capture_default_str();

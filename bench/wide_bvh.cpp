@@ -60,14 +60,12 @@ void add_cost(uintptr_t child, const float lo[3], const float hi[3], uint32_t bl
   const double area = half_area(lo, hi);
   if (WideNode::is_leaf(child)) {
     const uint32_t count = WideNode::leaf(child).count;
-    cost.by_triangles += area * count;
-    cost.by_leaves += area * ((count + block - 1) / block);
+    cost.tests += area * ((count + block - 1) / block);
     ++cost.leaves_count;
     cost.triangles_count += count;
     return;
   }
-  cost.by_triangles += area;
-  cost.by_leaves += area;
+  cost.tests += area;
   ++cost.nodes_count;
   const WideNode& node = *reinterpret_cast<const WideNode*>(child);
   for (uint32_t i = 0; i < node.count; ++i) add_cost(node.child[i], node.lo[i], node.hi[i], block, cost);
@@ -77,7 +75,7 @@ void add_cost(uintptr_t child, const float lo[3], const float hi[3], uint32_t bl
 
 WideCost measure_cost(uintptr_t root, uint32_t block) {
   WideCost cost;
-  if (WideNode::is_leaf(root)) return {0, 0, 0, 1, WideNode::leaf(root).count};
+  if (WideNode::is_leaf(root)) return {0, 0, 1, WideNode::leaf(root).count};
   const WideNode& node = *reinterpret_cast<const WideNode*>(root);
   float lo[3], hi[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -87,8 +85,8 @@ WideCost measure_cost(uintptr_t root, uint32_t block) {
     }
   }
   add_cost(root, lo, hi, block, cost);
-  const double area = half_area(lo, hi), scale = area > 0 ? 1 / area : 0;
-  cost.by_triangles *= scale, cost.by_leaves *= scale;
+  const double area = half_area(lo, hi);
+  cost.tests = area > 0 ? cost.tests / area : 0;
   return cost;
 }
 

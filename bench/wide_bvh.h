@@ -29,10 +29,9 @@ struct WideNode {
   static const WideLeaf& leaf(uintptr_t child) { return *reinterpret_cast<const WideLeaf*>(child & ~uintptr_t{1}); }
 };
 
-/// What a tree costs a line that meets its root, for one test of boxes a node; 0 when the root has no area.
+/// A tree by the surface-area heuristic: tests expected of a line that meets its root.
 struct WideCost {
-  double by_triangles = 0;  ///< a leaf costs its triangles: what the surface-area heuristic says in its first form
-  double by_leaves = 0;     ///< a leaf costs one for each `block` triangles begun: what one test of several lanes costs
+  double tests = 0;  ///< areas over the root's: of nodes, and of leaves for each block of their triangles begun
   uint64_t nodes_count = 0, leaves_count = 0, triangles_count = 0;
 };
 /// Of the tree at `root`, a child as in WideNode.
