@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <functional>
 
 namespace shoal {
@@ -95,12 +94,14 @@ Lanes scaled_areas(const LaneBox box[3], Lanes scale) {
   return lanes_sum3(products);
 }
 
-// A power of two that takes the longest side of a box to about one, so that areas fit floats. Finite for flat boxes.
+// The power of two that takes the longest side of a box to between one and two, so that areas fit floats; flat boxes as
+// if they were 2^-120 long.
 float area_scale(const LaneBox& box) {
-  float lo[4], hi[4];
-  lanes_store(box.lo, lo), lanes_store(box.hi, hi);
-  const float longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2], 0x1p-120f});
-  return std::ldexp(1.0f, -std::ilogb(longest));
+  float extent[4];
+  lanes_store(lanes_sub(box.hi, box.lo), extent);
+  const float longest = std::max({extent[0], extent[1], extent[2], 0x1p-120f});
+  const uint32_t exponent = std::bit_cast<uint32_t>(longest) >> 23;  // biased by 127, as that of the scale
+  return std::bit_cast<float>((2 * 127 - exponent) << 23);
 }
 
 }  // namespace
