@@ -7,6 +7,7 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -78,9 +79,11 @@ SahModel model_of(uint32_t block) {
   return block == kMaxLeafTriangles ? SahModel{kMaxLeafTriangles} : SahModel{kMaxLeafTriangles, block, 1};
 }
 
-void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
+void run_turn(Row& row, RTCDevice device, std::span<const BuildRef> refs) {
   if (row.ours) {
-    const OurBvh bvh(std::move(refs), model_of(row.block));
+    RefArray copy(refs.size());
+    tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { copy.refs()[i] = refs[i]; });
+    const OurBvh bvh(std::move(copy), model_of(row.block));
     row.add(bvh.spent());
     row.tree_seconds.push_back(bvh.tree_seconds());
     row.plan_seconds.push_back(bvh.plan_seconds());
@@ -88,9 +91,7 @@ void run_turn(Row& row, RTCDevice device, std::vector<BuildRef> refs) {
     if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), row.block);
     return;
   }
-  std::vector<RTCBuildPrimitive> primitives = primitives_of(refs);
-  refs = {};
-  const EmbreeBvh bvh(device, std::move(primitives), {kMaxLeafTriangles, row.block});
+  const EmbreeBvh bvh(device, primitives_of(refs), refs.size(), {kMaxLeafTriangles, row.block});
   if (bvh.root() == 0) stop({ErrorCode::kInternal, "rtcBuildBVH failed"});
   row.add(bvh.spent());
   if (row.cost.leaves_count == 0) row.cost = measure_cost(bvh.root(), row.block);
@@ -106,9 +107,9 @@ Table measure(const Arguments& arguments, const std::vector<float>& positions, u
   std::vector<double> refs_seconds;
   for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
     const double start = now_seconds();
-    const std::vector<BuildRef> refs = make_refs(positions);
+    const RefArray refs = make_refs(positions);
     refs_seconds.push_back(now_seconds() - start);
-    for (Row& row : table.rows) run_turn(row, device, refs);
+    for (Row& row : table.rows) run_turn(row, device, refs.refs());
   }
   table.refs_seconds = median(refs_seconds);
   rtcReleaseDevice(device);
@@ -179,7 +180,7 @@ int run(const Arguments& arguments) {
   const std::vector<float> positions = corner_positions(value_or_stop(read_triangles(gltf)));
   std::error_code code;
   std::filesystem::remove_all(folder, code);
-  if (make_refs(positions).empty()) stop({ErrorCode::kInput, gltf + ": no triangles"});
+  if (make_refs(positions).size() == 0) stop({ErrorCode::kInput, gltf + ": no triangles"});
   fmt::print("{}: {:.2f} M triangles, leaves of at most {}; median of {}. SAH cost: areas over the root's, of nodes and, "
              "for each {}, of leaves.\n",
              gltf, static_cast<double>(positions.size()) / 9e6, kMaxLeafTriangles, arguments.repeats,

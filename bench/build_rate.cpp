@@ -75,7 +75,8 @@ EmbreeSeconds build_with_embree(const Triangles& triangles, unsigned threads) {
   RTCDevice device = rtcNewDevice(fmt::format("threads={},set_affinity=0", threads).c_str());
   EmbreeSeconds seconds;
   seconds.scene = build_scene_seconds(device, triangles);
-  seconds.bvh = EmbreeBvh(device, primitives_of(make_refs(corner_positions(triangles))), {8, 1}).spent().seconds;
+  const RefArray refs = make_refs(corner_positions(triangles));
+  seconds.bvh = EmbreeBvh(device, primitives_of(refs.refs()), refs.size(), {8, 1}).spent().seconds;
   rtcReleaseDevice(device);
   return seconds;
 }

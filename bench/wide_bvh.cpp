@@ -5,6 +5,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "engine/clock.h"
 #include "treelets/collapse_wide.h"
@@ -90,8 +91,8 @@ WideCost measure_cost(uintptr_t root, uint32_t block) {
   return cost;
 }
 
-std::vector<RTCBuildPrimitive> primitives_of(std::span<const BuildRef> refs) {
-  std::vector<RTCBuildPrimitive> primitives(refs.size());
+HugeArray<RTCBuildPrimitive> primitives_of(std::span<const BuildRef> refs) {
+  HugeArray<RTCBuildPrimitive> primitives(refs.size());
   tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) {
     const BuildRef& r = refs[i];
     primitives[i] = {r.lo[0], r.lo[1], r.lo[2], 0, r.hi[0], r.hi[1], r.hi[2], r.id};
@@ -99,7 +100,8 @@ std::vector<RTCBuildPrimitive> primitives_of(std::span<const BuildRef> refs) {
   return primitives;
 }
 
-EmbreeBvh::EmbreeBvh(RTCDevice device, std::vector<RTCBuildPrimitive>&& primitives, const SahSettings& settings)
+EmbreeBvh::EmbreeBvh(RTCDevice device, HugeArray<RTCBuildPrimitive> primitives, size_t count,
+                     const SahSettings& settings)
     : bvh_(rtcNewBVH(device)) {
   RTCBuildArguments arguments = rtcDefaultBuildArguments();
   arguments.byteSize = sizeof(arguments);
@@ -110,7 +112,7 @@ EmbreeBvh::EmbreeBvh(RTCDevice device, std::vector<RTCBuildPrimitive>&& primitiv
   arguments.traversalCost = 1, arguments.intersectionCost = 1;
   arguments.bvh = bvh_;
   arguments.primitives = primitives.data();
-  arguments.primitiveCount = arguments.primitiveArrayCapacity = primitives.size();
+  arguments.primitiveCount = arguments.primitiveArrayCapacity = count;
   arguments.createNode = create_node;
   arguments.setNodeChildren = set_children;
   arguments.setNodeBounds = set_bounds;
@@ -171,14 +173,14 @@ class OurBvh::Arenas {
   tbb::enumerable_thread_specific<Arena> arenas_;
 };
 
-OurBvh::OurBvh(std::vector<BuildRef>&& refs, const SahModel& model) : arenas_(std::make_unique<Arenas>()) {
+OurBvh::OurBvh(RefArray refs, const SahModel& model) : arenas_(std::make_unique<Arenas>()) {
   const Stopwatch watch;
   {
-    const std::vector<BinaryNode> tree = build_binary_tree(refs, model);
+    const std::vector<BinaryNode> tree = build_binary_tree(refs.refs(), model);
     tree_seconds_ = watch.spent().seconds;
     const WidePlan plan(tree);
     plan_seconds_ = watch.spent().seconds - tree_seconds_;
-    root_ = arenas_->store(tree, plan, refs, 0);
+    root_ = arenas_->store(tree, plan, refs.refs(), 0);
   }
   spent_ = watch.spent();  // binary tree and plan given back, as Embree does with what it needs meanwhile
   store_seconds_ = spent_.seconds - plan_seconds_ - tree_seconds_;

@@ -8,9 +8,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <vector>
 
-#include "treelets/binned_sah.h"
+#include "treelets/triangle_refs.h"
 
 namespace shoal::bench {
 
@@ -48,12 +47,12 @@ struct Spent {
 };
 
 /// The references as Embree takes them.
-std::vector<RTCBuildPrimitive> primitives_of(std::span<const BuildRef> refs);
+HugeArray<RTCBuildPrimitive> primitives_of(std::span<const BuildRef> refs);
 
 /// Embree's builder: medium quality, branching 8, costs of 1 a node and 1 a block. Consumes the primitives.
 class EmbreeBvh {
  public:
-  EmbreeBvh(RTCDevice device, std::vector<RTCBuildPrimitive>&& primitives, const SahSettings& settings);
+  EmbreeBvh(RTCDevice device, HugeArray<RTCBuildPrimitive> primitives, size_t count, const SahSettings& settings);
   ~EmbreeBvh();
   EmbreeBvh(const EmbreeBvh&) = delete;
   EmbreeBvh& operator=(const EmbreeBvh&) = delete;
@@ -70,7 +69,7 @@ class EmbreeBvh {
 /// Our builder. Consumes the references.
 class OurBvh {
  public:
-  OurBvh(std::vector<BuildRef>&& refs, const SahModel& model);
+  OurBvh(RefArray refs, const SahModel& model);
   ~OurBvh();
 
   uintptr_t root() const { return root_; }

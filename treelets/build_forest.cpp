@@ -22,18 +22,19 @@ namespace shoal {
 namespace {
 
 // References sorted by part, in the order of the soup within each; begin[p] is the first of part p.
-std::vector<BuildRef> make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> part_of,
-                                        uint32_t part_count, std::vector<uint32_t>& begin) {
+RefArray make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> part_of,
+                           uint32_t part_count, std::vector<uint32_t>& begin) {
   begin.assign(part_count + 1, 0);
   for (size_t i = 0; i < soup.size(); ++i) begin[part_of[i] + 1] += !is_degenerate(&soup.positions[9 * i]);
   for (uint32_t p = 0; p < part_count; ++p) begin[p + 1] += begin[p];
   std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
-  std::vector<BuildRef> refs(begin[part_count]);
+  RefArray array(begin[part_count]);
+  const std::span<BuildRef> refs = array.refs();
   for (size_t i = 0; i < soup.size(); ++i) {
     const float* p = &soup.positions[9 * i];
     if (!is_degenerate(p)) refs[next[part_of[i]]++] = make_triangle_ref(p, static_cast<uint32_t>(i));
   }
-  return refs;
+  return array;
 }
 
 // The trees of all parts under nodes that join them, which only hold the array together: treelets are cut below.
@@ -244,7 +245,7 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
               soup.corners.size() == 3 * soup.layout.floats() * soup.size());
   SHOAL_CHECK(part_count > 0 && (part_of.empty() ? part_count == 1 : part_of.size() == soup.size()));
   std::vector<uint32_t> begin;
-  std::vector<BuildRef> refs;
+  RefArray refs;
   if (part_count == 1) {
     refs = make_refs(soup.positions);
     begin = {0, static_cast<uint32_t>(refs.size())};
@@ -254,13 +255,13 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
   part_of = {};
   sums.triangles_count += refs.size();
   sums.degenerate_count += soup.size() - refs.size();
-  if (refs.empty()) return {};
+  if (refs.size() == 0) return {};
 
-  ForestTree joined(refs, begin);
+  ForestTree joined(refs.refs(), begin);
   std::vector<BinaryNode>& tree = joined.nodes();
   std::vector<uint32_t> order(refs.size());
-  tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs[i].id; });
-  refs = {};
+  tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs.refs()[i].id; });
+  refs = RefArray();
   measure_leaves(soup, order, tree);
   const WidePlan plan(tree);
   const CoverageCropper cropper(soup, coverage);

@@ -23,6 +23,9 @@ inline Lanes lanes_set(float x, float y, float z) { return _mm_setr_ps(x, y, z, 
 inline Lanes lanes_load3(const float* p) {
   return _mm_and_ps(_mm_load_ps(p), _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0)));
 }
+inline Lanes lanes_load_unaligned(const float p[4]) { return _mm_loadu_ps(p); }
+/// {y, z, w, x}.
+inline Lanes lanes_rotate4(Lanes a) { return _mm_shuffle_ps(a, a, _MM_SHUFFLE(0, 3, 2, 1)); }
 inline void lanes_store(Lanes v, float out[4]) { _mm_storeu_ps(out, v); }
 /// Minima and maxima give `b` where `a` is not a number.
 inline Lanes lanes_min(Lanes a, Lanes b) { return _mm_min_ps(a, b); }
@@ -36,6 +39,7 @@ inline void lanes_truncate(Lanes v, int32_t out[4]) {
 }
 /// Lanes where the comparison holds are all ones (not a number), the others zero.
 inline Lanes lanes_less(Lanes a, Lanes b) { return _mm_cmplt_ps(a, b); }
+inline Lanes lanes_at_most(Lanes a, Lanes b) { return _mm_cmple_ps(a, b); }
 inline Lanes lanes_equal(Lanes a, Lanes b) { return _mm_cmpeq_ps(a, b); }
 inline Lanes lanes_and(Lanes a, Lanes b) { return _mm_and_ps(a, b); }
 inline Lanes lanes_or(Lanes a, Lanes b) { return _mm_or_ps(a, b); }
@@ -66,6 +70,8 @@ struct Lanes {
 inline Lanes lanes_set(float v) { return {{v, v, v, v}}; }
 inline Lanes lanes_set(float x, float y, float z) { return {{x, y, z, 0.0f}}; }
 inline Lanes lanes_load3(const float* p) { return {{p[0], p[1], p[2], 0.0f}}; }
+inline Lanes lanes_load_unaligned(const float p[4]) { return {{p[0], p[1], p[2], p[3]}}; }
+inline Lanes lanes_rotate4(Lanes a) { return {{a.v[1], a.v[2], a.v[3], a.v[0]}}; }
 inline void lanes_store(Lanes v, float out[4]) {
   for (int i = 0; i < 4; ++i) out[i] = v.v[i];
 }
@@ -99,6 +105,9 @@ inline Lanes lanes_each_bits(Lanes a, Lanes b, F f) {
 }
 inline Lanes lanes_less(Lanes a, Lanes b) {
   return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x < y ? ~0u : 0u); });
+}
+inline Lanes lanes_at_most(Lanes a, Lanes b) {
+  return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x <= y ? ~0u : 0u); });
 }
 inline Lanes lanes_equal(Lanes a, Lanes b) {
   return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x == y ? ~0u : 0u); });
@@ -148,6 +157,8 @@ inline Lanes lanes_convert(IntLanes a) {
 }
 #endif
 
+/// Without signs.
+inline Lanes lanes_absolute(Lanes a) { return lanes_and(a, lanes_not(lanes_set(-0.0f))); }
 /// Bits of `a` where `mask` is set, of `b` elsewhere.
 inline Lanes lanes_select(Lanes mask, Lanes a, Lanes b) {
   return lanes_or(lanes_and(mask, a), lanes_and(lanes_not(mask), b));
