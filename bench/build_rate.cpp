@@ -91,7 +91,8 @@ uint64_t bytes_of_folder(const std::filesystem::path& folder) {
 
 int run(const Arguments& arguments) {
   const std::filesystem::path folder = arguments.folder + fmt::format("/shoal-build-rate-{}", ::getpid());
-  const std::string gltf = arguments.gltf.empty() ? value_or_stop(generate_terrain(folder / "scene", arguments.triangles)) : arguments.gltf;
+  const std::string gltf =
+      arguments.gltf.empty() ? value_or_stop(generate_terrain(folder / "scene", arguments.triangles)) : arguments.gltf;
   std::filesystem::create_directories(folder);
   const uint64_t input_bytes = bytes_of_folder(std::filesystem::path(gltf).parent_path());
   const uint64_t cap = arguments.cap_bytes > 0 ? arguments.cap_bytes : std::max(input_bytes / 4, kLeastCapBytes);

@@ -17,13 +17,14 @@ struct Measure {
   LaneBox box, centroids;
 };
 
-// Without branches: which side a reference goes to cannot be foreseen. Every reference is swapped with the first of those
-// that go right, and the border passes it when it goes left.
+// Without branches: which side a reference goes to cannot be foreseen. Every reference is swapped with the first of
+// those that go right, and the border passes it when it goes left.
 size_t partition_serial(std::span<BuildRef> refs, const Binning& binning, const SahSplit& split, LaneBox& left,
                         LaneBox& right) {
   const Binning::Side side = binning.side_of(split);
   const Lanes none = lanes_set(0.0f), all = lanes_not(none);
-  const Lanes unless_left[2] = {all, none}, unless_right[2] = {none, all};  // or-ed: not a number, which is not included
+  // Or-ed with a centroid they make it no number, which is not included.
+  const Lanes unless_left[2] = {all, none}, unless_right[2] = {none, all};
   LaneBox lefts = left, rights = right;
   size_t border = 0;
   for (size_t i = 0; i < refs.size(); ++i) {

@@ -20,6 +20,46 @@ uint32_t choose_bin_count(uint32_t ref_count) {
   return ref_count <= 128 ? 16 : kMaxBinCount;
 }
 
+// Half the area of three boxes, one a lane, times the square of `scale`.
+Lanes scaled_areas(const LaneBox box[3], Lanes scale) {
+  Lanes products[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const Lanes extent = lanes_mul(lanes_sub(box[axis].hi, box[axis].lo), scale);
+    products[axis] = lanes_mul(extent, lanes_rotate3(extent));
+  }
+  return lanes_sum3(products);
+}
+
+// The power of two that takes the longest side of a box to between one and two, so that areas fit floats; flat boxes as
+// if they were 2^-120 long.
+float area_scale(const LaneBox& box) {
+  float extent[4];
+  lanes_store(lanes_sub(box.hi, box.lo), extent);
+  const float longest = std::max({extent[0], extent[1], extent[2], 0x1p-120f});
+  const uint32_t exponent = std::bit_cast<uint32_t>(longest) >> 23;  // biased by 127, as that of the scale
+  return std::bit_cast<float>((2 * 127 - exponent) << 23);
+}
+
+// The cheapest of the planes of three axes, whose cost lacks the square of `scale`; bin 0: that axis has none.
+SahSplit choose_axis(Lanes lane_cost, Lanes lane_larger, Lanes lane_bin, float scale) {
+  float cost[4], larger[4], bin[4];
+  lanes_store(lane_cost, cost), lanes_store(lane_larger, larger), lanes_store(lane_bin, bin);
+  SahSplit best;
+  int chosen = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (bin[axis] == 0) continue;
+    if (chosen >= 0 && !(cost[axis] < cost[chosen] || (cost[axis] == cost[chosen] && larger[axis] < larger[chosen]))) {
+      continue;
+    }
+    chosen = axis;
+  }
+  if (chosen < 0) return best;
+  best.axis = chosen;
+  best.bin = static_cast<uint32_t>(bin[chosen]);
+  best.cost = cost[chosen] / (static_cast<double>(scale) * scale);
+  return best;
+}
+
 }  // namespace
 
 Binning::Binning(const LaneBox& centroids, uint32_t ref_count) : bin_count_(choose_bin_count(ref_count)) {
@@ -82,30 +122,6 @@ void SahBins::merge(const SahBins& other) {
   }
 }
 
-namespace {
-
-// Half the area of three boxes, one a lane, times the square of `scale`.
-Lanes scaled_areas(const LaneBox box[3], Lanes scale) {
-  Lanes products[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const Lanes extent = lanes_mul(lanes_sub(box[axis].hi, box[axis].lo), scale);
-    products[axis] = lanes_mul(extent, lanes_rotate3(extent));
-  }
-  return lanes_sum3(products);
-}
-
-// The power of two that takes the longest side of a box to between one and two, so that areas fit floats; flat boxes as
-// if they were 2^-120 long.
-float area_scale(const LaneBox& box) {
-  float extent[4];
-  lanes_store(lanes_sub(box.hi, box.lo), extent);
-  const float longest = std::max({extent[0], extent[1], extent[2], 0x1p-120f});
-  const uint32_t exponent = std::bit_cast<uint32_t>(longest) >> 23;  // biased by 127, as that of the scale
-  return std::bit_cast<float>((2 * 127 - exponent) << 23);
-}
-
-}  // namespace
-
 // All axes at once, one a lane. Where one side is empty the cost is not a number (infinite area, no test): such planes
 // lose every comparison.
 SahSplit SahBins::best_split(const LaneBox& box, uint32_t block) const {
@@ -146,25 +162,6 @@ SahSplit SahBins::best_split(const LaneBox& box, uint32_t block) const {
     best_bin = lanes_select(better, bin, best_bin);
   }
   return choose_axis(best_cost, best_larger, best_bin, scale);
-}
-
-SahSplit SahBins::choose_axis(Lanes lane_cost, Lanes lane_larger, Lanes lane_bin, float scale) {
-  float cost[4], larger[4], bin[4];
-  lanes_store(lane_cost, cost), lanes_store(lane_larger, larger), lanes_store(lane_bin, bin);
-  SahSplit best;
-  int chosen = -1;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (bin[axis] == 0) continue;  // no plane
-    if (chosen >= 0 && !(cost[axis] < cost[chosen] || (cost[axis] == cost[chosen] && larger[axis] < larger[chosen]))) {
-      continue;
-    }
-    chosen = axis;
-  }
-  if (chosen < 0) return best;
-  best.axis = chosen;
-  best.bin = static_cast<uint32_t>(bin[chosen]);
-  best.cost = cost[chosen] / (static_cast<double>(scale) * scale);
-  return best;
 }
 
 void SahBins::child_boxes(const SahSplit& split, LaneBox& left, LaneBox& right) const {
