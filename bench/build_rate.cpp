@@ -13,15 +13,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bench/load_triangles.h"
+#include "bench/wide_bvh.h"
 #include "engine/clock.h"
-#include "engine/generate.h"
 #include "engine/render_report.h"
-#include "io/gltf_accessor.h"
 #include "tests/support/memory_group.h"
+#include "treelets/triangle_refs.h"
 
 namespace {
 
 using namespace shoal;
+using namespace shoal::bench;
 using Json = nlohmann::ordered_json;
 
 /// Less cannot work, whatever the scene: program and buffers.
@@ -43,42 +45,6 @@ template <class T>
 T value_or_stop(Result<T> result) {
   if (!result.ok()) stop(result.error());
   return std::move(result).value();
-}
-
-/// A glTF's triangles as Embree takes them. Meshes that several nodes show count once, untransformed: for a rate of
-/// building that is the same work.
-struct Triangles {
-  std::vector<float> vertices;  ///< padded by one float: Embree reads 16 bytes a vertex
-  std::vector<uint32_t> indices;
-  uint64_t count() const { return indices.size() / 3; }
-};
-
-void append(gltf::BufferFiles& files, const gltf::Document& document, const gltf::Primitive& primitive,
-            Triangles& out) {
-  gltf::TriangleStream stream = value_or_stop(gltf::TriangleStream::open(files, document, primitive));
-  if (stream.count() == 0) return;
-  const size_t first_index = out.indices.size();
-  const auto base = static_cast<uint32_t>(out.vertices.size() / 3);
-  out.indices.resize(first_index + 3 * stream.count());
-  const Status read = stream.read(0, stream.count(), std::span(out.indices).subspan(first_index));
-  if (!read.ok()) stop(read.error());
-  for (size_t i = first_index; i < out.indices.size(); ++i) out.indices[i] += base;
-  gltf::AccessorReader positions =
-      value_or_stop(gltf::AccessorReader::open(files, document, primitive.attributes.at("POSITION")));
-  out.vertices.resize(3 * (base + stream.vertex_count()));
-  const Status floats = positions.read_floats(0, stream.vertex_count(), std::span(out.vertices).subspan(3 * base));
-  if (!floats.ok()) stop(floats.error());
-}
-
-Triangles read_triangles(const std::string& path) {
-  const gltf::Document document = value_or_stop(gltf::load_document(posix_file_system(), path));
-  gltf::BufferFiles files(posix_file_system(), document);
-  Triangles out;
-  for (const gltf::Mesh& mesh : document.meshes) {
-    for (const gltf::Primitive& primitive : mesh.primitives) append(files, document, primitive, out);
-  }
-  out.vertices.push_back(0);
-  return out;
 }
 
 struct EmbreeSeconds {
@@ -105,62 +71,12 @@ double build_scene_seconds(RTCDevice device, const Triangles& triangles) {
   return seconds;
 }
 
-std::vector<RTCBuildPrimitive> boxes_of(const Triangles& triangles) {
-  std::vector<RTCBuildPrimitive> boxes(triangles.count());
-  for (size_t i = 0; i < boxes.size(); ++i) {
-    float lo[3], hi[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto at = [&](size_t corner) { return triangles.vertices[3 * triangles.indices[3 * i + corner] + axis]; };
-      lo[axis] = std::min({at(0), at(1), at(2)}), hi[axis] = std::max({at(0), at(1), at(2)});
-    }
-    boxes[i] = {lo[0], lo[1], lo[2], 0, hi[0], hi[1], hi[2], static_cast<unsigned>(i)};
-  }
-  return boxes;
-}
-
-/// A node as small as the interface allows: what is stored is the caller's business, and so is its time.
-double build_bvh_seconds(RTCDevice device, std::vector<RTCBuildPrimitive> boxes) {
-  struct Node {
-    RTCBounds bounds[8];
-    void* child[8];
-  };
-  RTCBVH bvh = rtcNewBVH(device);
-  RTCBuildArguments arguments = rtcDefaultBuildArguments();
-  arguments.byteSize = sizeof(arguments);
-  arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM;
-  arguments.maxBranchingFactor = 8;
-  arguments.minLeafSize = 1, arguments.maxLeafSize = 8;
-  arguments.bvh = bvh;
-  arguments.primitives = boxes.data();
-  arguments.primitiveCount = arguments.primitiveArrayCapacity = boxes.size();
-  arguments.createNode = [](RTCThreadLocalAllocator allocator, unsigned, void*) {
-    return rtcThreadLocalAlloc(allocator, sizeof(Node), 16);
-  };
-  arguments.setNodeChildren = [](void* node, void** children, unsigned count, void*) {
-    for (unsigned i = 0; i < count; ++i) static_cast<Node*>(node)->child[i] = children[i];
-  };
-  arguments.setNodeBounds = [](void* node, const RTCBounds** bounds, unsigned count, void*) {
-    for (unsigned i = 0; i < count; ++i) static_cast<Node*>(node)->bounds[i] = *bounds[i];
-  };
-  arguments.createLeaf = [](RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives, size_t count,
-                            void*) {
-    auto* leaf = static_cast<unsigned*>(rtcThreadLocalAlloc(allocator, 4 * (count + 1), 16));
-    leaf[0] = static_cast<unsigned>(count);
-    for (size_t i = 0; i < count; ++i) leaf[i + 1] = primitives[i].primID;
-    return static_cast<void*>(leaf);
-  };
-  const double start = now_seconds();
-  const void* root = rtcBuildBVH(&arguments);
-  const double seconds = now_seconds() - start;
-  rtcReleaseBVH(bvh);
-  return root != nullptr ? seconds : 0;
-}
-
 EmbreeSeconds build_with_embree(const Triangles& triangles, unsigned threads) {
   RTCDevice device = rtcNewDevice(fmt::format("threads={},set_affinity=0", threads).c_str());
   EmbreeSeconds seconds;
   seconds.scene = build_scene_seconds(device, triangles);
-  seconds.bvh = build_bvh_seconds(device, boxes_of(triangles));
+  const RefArray refs = make_refs(corner_positions(triangles));
+  seconds.bvh = EmbreeBvh(device, primitives_of(refs.refs()), refs.size(), {8, 1}).spent().seconds;
   rtcReleaseDevice(device);
   return seconds;
 }
@@ -173,17 +89,10 @@ uint64_t bytes_of_folder(const std::filesystem::path& folder) {
   return sum;
 }
 
-std::string generated(const Arguments& arguments, const std::filesystem::path& folder) {
-  GenerateOptions options;
-  options.kind = "terrain";
-  options.triangles = arguments.triangles;
-  options.out_dir = folder.string();
-  return value_or_stop(generate_scene(posix_file_system(), options)).gltf_path;
-}
-
 int run(const Arguments& arguments) {
   const std::filesystem::path folder = arguments.folder + fmt::format("/shoal-build-rate-{}", ::getpid());
-  const std::string gltf = arguments.gltf.empty() ? generated(arguments, folder / "scene") : arguments.gltf;
+  const std::string gltf =
+      arguments.gltf.empty() ? value_or_stop(generate_terrain(folder / "scene", arguments.triangles)) : arguments.gltf;
   std::filesystem::create_directories(folder);
   const uint64_t input_bytes = bytes_of_folder(std::filesystem::path(gltf).parent_path());
   const uint64_t cap = arguments.cap_bytes > 0 ? arguments.cap_bytes : std::max(input_bytes / 4, kLeastCapBytes);
@@ -196,7 +105,7 @@ int run(const Arguments& arguments) {
   std::error_code code;
   const uint64_t output_bytes = built.exit_code == 0 ? std::filesystem::file_size(output, code) : 0;
   std::filesystem::remove(output, code);
-  const Triangles triangles = read_triangles(gltf);
+  const Triangles triangles = value_or_stop(read_triangles(gltf));
   const EmbreeSeconds embree = build_with_embree(triangles, arguments.threads);
   std::filesystem::remove_all(folder, code);
   if (built.exit_code != 0) return built.exit_code;

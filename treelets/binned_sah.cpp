@@ -39,7 +39,7 @@ struct Fragment {
 
 class TreeBuilder {
  public:
-  TreeBuilder(std::span<BuildRef> refs, uint32_t leaf_size) : refs_(refs), leaf_size_(leaf_size) {}
+  TreeBuilder(std::span<BuildRef> refs, const SahModel& model) : refs_(refs), model_(model) {}
 
   std::vector<BinaryNode> build() {
     Range root{0, static_cast<uint32_t>(refs_.size()), 0, {}, {}};
@@ -56,7 +56,8 @@ class TreeBuilder {
   }
 
  private:
-  uint64_t blocks(uint64_t count) const { return (count + leaf_size_ - 1) / leaf_size_; }
+  uint64_t test_count(uint64_t count) const { return (count + model_.block - 1) / model_.block; }
+  uint64_t blocks(uint64_t count) const { return (count + model_.leaf_size - 1) / model_.leaf_size; }
 
   void measure(Range& range) const {
     measure_refs(refs_.subspan(range.begin, range.count()), range.box, range.centroids);
@@ -70,7 +71,7 @@ class TreeBuilder {
   // Splits into left and right, or returns false: the range is a leaf.
   bool split(const Range& range, Range& left, Range& right) {
     const uint32_t n = range.count();
-    const bool may_be_leaf = n <= leaf_size_;
+    const bool may_be_leaf = n <= model_.leaf_size;
     if (n == 1 || (may_be_leaf && range.depth >= kMaxBinaryDepth)) return false;
     if (!may_be_leaf && must_halve(range)) return halve(range, true, left, right), true;
 
@@ -79,10 +80,10 @@ class TreeBuilder {
     const std::span<BuildRef> refs = refs_.subspan(range.begin, n);
     SahBins bins(binning.bin_count());
     fill_bins(refs, binning, bins);
-    const SahSplit best = bins.best_split(leaf_size_);
+    const SahSplit best = bins.best_split(range.box, model_.block);
     if (may_be_leaf) {
-      const double area = half_area(range.box);
-      if (!best.found() || kSplitCost * area + best.cost >= area) return false;
+      const double area = half_area(range.box), leaf_cost = area * static_cast<double>(test_count(n));
+      if (!best.found() || model_.split_cost * area + best.cost >= leaf_cost) return false;
     } else if (!best.found()) {
       return halve(range, true, left, right), true;
     }
@@ -97,7 +98,7 @@ class TreeBuilder {
 
   // Halves by count, in whole leaves; `ordered`: by centroid along the widest axis, else as they lie.
   void halve(const Range& range, bool ordered, Range& left, Range& right) {
-    const uint32_t left_count = static_cast<uint32_t>((blocks(range.count()) + 1) / 2 * leaf_size_);
+    const uint32_t left_count = static_cast<uint32_t>((blocks(range.count()) + 1) / 2 * model_.leaf_size);
     const uint32_t middle = range.begin + left_count;
     if (ordered) order_by_centroid(refs_.subspan(range.begin, range.count()), left_count, range.centroids);
     left = {range.begin, middle, range.depth + 1, {}, {}};
@@ -165,14 +166,14 @@ class TreeBuilder {
   }
 
   std::span<BuildRef> refs_;
-  uint32_t leaf_size_;
+  SahModel model_;
 };
 
 }  // namespace
 
-std::vector<BinaryNode> build_binary_tree(std::span<BuildRef> refs, uint32_t leaf_size) {
-  SHOAL_CHECK(!refs.empty() && refs.size() < (1u << 31) && leaf_size > 0);
-  return TreeBuilder(refs, leaf_size).build();
+std::vector<BinaryNode> build_binary_tree(std::span<BuildRef> refs, const SahModel& model) {
+  SHOAL_CHECK(!refs.empty() && refs.size() < (1u << 31) && model.leaf_size > 0 && std::has_single_bit(model.block));
+  return TreeBuilder(refs, model).build();
 }
 
 }  // namespace shoal

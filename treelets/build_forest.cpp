@@ -22,44 +22,20 @@
 namespace shoal {
 namespace {
 
-constexpr size_t kChunkTriangles = 1u << 14;
-
-// References to the triangles that are stored, in the order of the soup.
-std::vector<BuildRef> make_refs(const TriangleSoup& soup) {
-  const size_t count = soup.size(), chunk_count = (count + kChunkTriangles - 1) / kChunkTriangles;
-  std::vector<size_t> begin(chunk_count + 1, 0);
-  const auto for_each_stored = [&](size_t chunk, auto visit) {
-    const size_t end = std::min(count, (chunk + 1) * kChunkTriangles);
-    for (size_t i = chunk * kChunkTriangles; i < end; ++i) {
-      if (!is_degenerate(&soup.positions[9 * i])) visit(i);
-    }
-  };
-  tbb::parallel_for(size_t{0}, chunk_count,
-                    [&](size_t chunk) { for_each_stored(chunk, [&](size_t) { ++begin[chunk + 1]; }); });
-  for (size_t chunk = 0; chunk < chunk_count; ++chunk) begin[chunk + 1] += begin[chunk];
-  std::vector<BuildRef> refs(begin[chunk_count]);
-  tbb::parallel_for(size_t{0}, chunk_count, [&](size_t chunk) {
-    size_t next = begin[chunk];
-    for_each_stored(chunk, [&](size_t i) {
-      refs[next++] = make_triangle_ref(&soup.positions[9 * i], static_cast<uint32_t>(i));
-    });
-  });
-  return refs;
-}
-
 // References sorted by part, in the order of the soup within each; begin[p] is the first of part p.
-std::vector<BuildRef> make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> part_of,
-                                        uint32_t part_count, std::vector<uint32_t>& begin) {
+RefArray make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> part_of,
+                           uint32_t part_count, std::vector<uint32_t>& begin) {
   begin.assign(part_count + 1, 0);
   for (size_t i = 0; i < soup.size(); ++i) begin[part_of[i] + 1] += !is_degenerate(&soup.positions[9 * i]);
   for (uint32_t p = 0; p < part_count; ++p) begin[p + 1] += begin[p];
   std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
-  std::vector<BuildRef> refs(begin[part_count]);
+  RefArray array(begin[part_count]);
+  const std::span<BuildRef> refs = array.refs();
   for (size_t i = 0; i < soup.size(); ++i) {
     const float* p = &soup.positions[9 * i];
     if (!is_degenerate(p)) refs[next[part_of[i]]++] = make_triangle_ref(p, static_cast<uint32_t>(i));
   }
-  return refs;
+  return array;
 }
 
 // The trees of all parts under nodes that join them, which only hold the array together: treelets are cut below.
@@ -70,7 +46,7 @@ class ForestTree {
     roots_.resize(parts);
     if (parts == 1) {
       roots_[0] = 0;
-      nodes_ = build_binary_tree(refs, kMaxLeafTriangles);
+      nodes_ = build_binary_tree(refs, {kMaxLeafTriangles});
       return;
     }
     nodes_.reserve(2 * refs.size());  // what is never written takes no memory
@@ -103,7 +79,7 @@ class ForestTree {
 
   void add_part(uint32_t p) {
     const std::vector<BinaryNode> tree =
-        build_binary_tree(refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), kMaxLeafTriangles);
+        build_binary_tree(refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), {kMaxLeafTriangles});
     const auto shift = static_cast<uint32_t>(nodes_.size() - 1);
     for (size_t i = 0; i < tree.size(); ++i) {
       BinaryNode node = tree[i];
@@ -272,9 +248,9 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
               soup.corners.size() == 3 * soup.layout.floats() * soup.size());
   SHOAL_CHECK(part_count > 0 && (part_of.empty() ? part_count == 1 : part_of.size() == soup.size()));
   std::vector<uint32_t> begin;
-  std::vector<BuildRef> refs;
+  RefArray refs;
   if (part_count == 1) {
-    refs = make_refs(soup);
+    refs = make_refs(soup.positions);
     begin = {0, static_cast<uint32_t>(refs.size())};
   } else {
     refs = make_refs_by_part(soup, part_of, part_count, begin);
@@ -282,13 +258,13 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
   part_of = {};
   sums.triangles_count += refs.size();
   sums.degenerate_count += soup.size() - refs.size();
-  if (refs.empty()) return {};
+  if (refs.size() == 0) return {};
 
-  ForestTree joined(refs, begin);
+  ForestTree joined(refs.refs(), begin);
   std::vector<BinaryNode>& tree = joined.nodes();
   std::vector<uint32_t> order(refs.size());
-  tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs[i].id; });
-  refs = {};
+  tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs.refs()[i].id; });
+  refs = RefArray();
   measure_leaves(soup, order, tree);
   const WidePlan plan(tree);
   const CoverageCropper cropper(soup, coverage);

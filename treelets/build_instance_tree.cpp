@@ -34,7 +34,7 @@ std::vector<TopNode> build_instance_tree(std::span<const InstanceBounds> instanc
     const uint32_t leads_to = 0;
     return collapse_top({&nothing, 1}, {&leads_to, 1}, ChildKind::kEmpty);
   }
-  const std::vector<BinaryNode> tree = build_binary_tree(refs, 1);
+  const std::vector<BinaryNode> tree = build_binary_tree(refs, {1});
   std::vector<uint32_t> leaf_index(tree.size(), kNoIndex);
   for (size_t i = 0; i < tree.size(); ++i) {
     if (tree[i].leaf()) leaf_index[i] = refs[tree[i].first].id;

@@ -3,6 +3,7 @@
 // Called by treelets/binned_sah. Plain values.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <limits>
 
@@ -22,7 +23,11 @@ inline Lanes lanes_set(float x, float y, float z) { return _mm_setr_ps(x, y, z, 
 inline Lanes lanes_load3(const float* p) {
   return _mm_and_ps(_mm_load_ps(p), _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0)));
 }
+inline Lanes lanes_load_unaligned(const float p[4]) { return _mm_loadu_ps(p); }
+/// {y, z, w, x}.
+inline Lanes lanes_rotate4(Lanes a) { return _mm_shuffle_ps(a, a, _MM_SHUFFLE(0, 3, 2, 1)); }
 inline void lanes_store(Lanes v, float out[4]) { _mm_storeu_ps(out, v); }
+/// Minima and maxima give `b` where `a` is not a number.
 inline Lanes lanes_min(Lanes a, Lanes b) { return _mm_min_ps(a, b); }
 inline Lanes lanes_max(Lanes a, Lanes b) { return _mm_max_ps(a, b); }
 inline Lanes lanes_add(Lanes a, Lanes b) { return _mm_add_ps(a, b); }
@@ -32,6 +37,32 @@ inline Lanes lanes_mul(Lanes a, Lanes b) { return _mm_mul_ps(a, b); }
 inline void lanes_truncate(Lanes v, int32_t out[4]) {
   _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_cvttps_epi32(v));
 }
+/// Lanes where the comparison holds are all ones (not a number), the others zero.
+inline Lanes lanes_less(Lanes a, Lanes b) { return _mm_cmplt_ps(a, b); }
+inline Lanes lanes_at_most(Lanes a, Lanes b) { return _mm_cmple_ps(a, b); }
+inline Lanes lanes_equal(Lanes a, Lanes b) { return _mm_cmpeq_ps(a, b); }
+inline Lanes lanes_and(Lanes a, Lanes b) { return _mm_and_ps(a, b); }
+inline Lanes lanes_or(Lanes a, Lanes b) { return _mm_or_ps(a, b); }
+inline Lanes lanes_not(Lanes a) { return _mm_xor_ps(a, _mm_castsi128_ps(_mm_set1_epi32(-1))); }
+/// Bit i: the sign of lane i.
+inline int lanes_mask(Lanes a) { return _mm_movemask_ps(a); }
+/// {y, z, x, w}.
+inline Lanes lanes_rotate3(Lanes a) { return _mm_shuffle_ps(a, a, _MM_SHUFFLE(3, 0, 2, 1)); }
+/// Lane k: the first three lanes of a[k], summed in order; lane 3 is zero.
+inline Lanes lanes_sum3(const Lanes a[3]) {
+  Lanes x = a[0], y = a[1], z = a[2], w = _mm_setzero_ps();
+  _MM_TRANSPOSE4_PS(x, y, z, w);
+  return _mm_add_ps(_mm_add_ps(x, y), z);
+}
+
+using IntLanes = __m128i;
+inline IntLanes int_lanes_set(int32_t v) { return _mm_set1_epi32(v); }
+/// Requires: 16-byte aligned.
+inline IntLanes int_lanes_load(const int32_t p[4]) { return _mm_load_si128(reinterpret_cast<const __m128i*>(p)); }
+inline IntLanes int_lanes_add(IntLanes a, IntLanes b) { return _mm_add_epi32(a, b); }
+inline IntLanes int_lanes_sub(IntLanes a, IntLanes b) { return _mm_sub_epi32(a, b); }
+inline IntLanes int_lanes_shift_right(IntLanes a, int bits) { return _mm_srl_epi32(a, _mm_cvtsi32_si128(bits)); }
+inline Lanes lanes_convert(IntLanes a) { return _mm_cvtepi32_ps(a); }
 #else
 struct Lanes {
   float v[4];
@@ -39,6 +70,8 @@ struct Lanes {
 inline Lanes lanes_set(float v) { return {{v, v, v, v}}; }
 inline Lanes lanes_set(float x, float y, float z) { return {{x, y, z, 0.0f}}; }
 inline Lanes lanes_load3(const float* p) { return {{p[0], p[1], p[2], 0.0f}}; }
+inline Lanes lanes_load_unaligned(const float p[4]) { return {{p[0], p[1], p[2], p[3]}}; }
+inline Lanes lanes_rotate4(Lanes a) { return {{a.v[1], a.v[2], a.v[3], a.v[0]}}; }
 inline void lanes_store(Lanes v, float out[4]) {
   for (int i = 0; i < 4; ++i) out[i] = v.v[i];
 }
@@ -64,7 +97,72 @@ inline Lanes lanes_mul(Lanes a, Lanes b) {
 inline void lanes_truncate(Lanes v, int32_t out[4]) {
   for (int i = 0; i < 4; ++i) out[i] = static_cast<int32_t>(v.v[i]);
 }
+template <class F>
+inline Lanes lanes_each_bits(Lanes a, Lanes b, F f) {
+  return lanes_each(a, b, [f](float x, float y) {
+    return std::bit_cast<float>(f(std::bit_cast<uint32_t>(x), std::bit_cast<uint32_t>(y)));
+  });
+}
+inline Lanes lanes_less(Lanes a, Lanes b) {
+  return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x < y ? ~0u : 0u); });
+}
+inline Lanes lanes_at_most(Lanes a, Lanes b) {
+  return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x <= y ? ~0u : 0u); });
+}
+inline Lanes lanes_equal(Lanes a, Lanes b) {
+  return lanes_each(a, b, [](float x, float y) { return std::bit_cast<float>(x == y ? ~0u : 0u); });
+}
+inline Lanes lanes_and(Lanes a, Lanes b) {
+  return lanes_each_bits(a, b, [](uint32_t x, uint32_t y) { return x & y; });
+}
+inline Lanes lanes_or(Lanes a, Lanes b) {
+  return lanes_each_bits(a, b, [](uint32_t x, uint32_t y) { return x | y; });
+}
+inline Lanes lanes_not(Lanes a) {
+  return lanes_each_bits(a, a, [](uint32_t x, uint32_t) { return ~x; });
+}
+inline int lanes_mask(Lanes a) {
+  int mask = 0;
+  for (int i = 0; i < 4; ++i) mask |= static_cast<int>(std::bit_cast<uint32_t>(a.v[i]) >> 31) << i;
+  return mask;
+}
+inline Lanes lanes_rotate3(Lanes a) { return {{a.v[1], a.v[2], a.v[0], a.v[3]}}; }
+inline Lanes lanes_sum3(const Lanes a[3]) {
+  Lanes sum{};
+  for (int i = 0; i < 3; ++i) sum.v[i] = (a[i].v[0] + a[i].v[1]) + a[i].v[2];
+  return sum;
+}
+
+struct IntLanes {
+  int32_t v[4];
+};
+inline IntLanes int_lanes_set(int32_t v) { return {{v, v, v, v}}; }
+inline IntLanes int_lanes_load(const int32_t p[4]) { return {{p[0], p[1], p[2], p[3]}}; }
+inline IntLanes int_lanes_add(IntLanes a, IntLanes b) {
+  for (int i = 0; i < 4; ++i) a.v[i] += b.v[i];
+  return a;
+}
+inline IntLanes int_lanes_sub(IntLanes a, IntLanes b) {
+  for (int i = 0; i < 4; ++i) a.v[i] -= b.v[i];
+  return a;
+}
+inline IntLanes int_lanes_shift_right(IntLanes a, int bits) {
+  for (int i = 0; i < 4; ++i) a.v[i] = static_cast<int32_t>(static_cast<uint32_t>(a.v[i]) >> bits);
+  return a;
+}
+inline Lanes lanes_convert(IntLanes a) {
+  Lanes out;
+  for (int i = 0; i < 4; ++i) out.v[i] = static_cast<float>(a.v[i]);
+  return out;
+}
 #endif
+
+/// Without signs.
+inline Lanes lanes_absolute(Lanes a) { return lanes_and(a, lanes_not(lanes_set(-0.0f))); }
+/// Bits of `a` where `mask` is set, of `b` elsewhere.
+inline Lanes lanes_select(Lanes mask, Lanes a, Lanes b) {
+  return lanes_or(lanes_and(mask, a), lanes_and(lanes_not(mask), b));
+}
 
 struct LaneBox {
   Lanes lo = lanes_set(std::numeric_limits<float>::infinity());

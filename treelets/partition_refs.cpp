@@ -17,15 +17,30 @@ struct Measure {
   LaneBox box, centroids;
 };
 
+// Without branches: which side a reference goes to cannot be foreseen. Every reference is swapped with the first of
+// those that go right, and the border passes it when it goes left.
 size_t partition_serial(std::span<BuildRef> refs, const Binning& binning, const SahSplit& split, LaneBox& left,
                         LaneBox& right) {
-  size_t begin = 0, end = refs.size();
-  for (;;) {
-    while (begin < end && binning.goes_left(refs[begin], split)) left.include(binning_centroid(refs[begin++]));
-    while (begin < end && !binning.goes_left(refs[end - 1], split)) right.include(binning_centroid(refs[--end]));
-    if (begin >= end) return begin;
-    std::swap(refs[begin], refs[end - 1]);
+  const Binning::Side side = binning.side_of(split);
+  const Lanes none = lanes_set(0.0f), all = lanes_not(none);
+  // Or-ed with a centroid they make it no number, which is not included.
+  const Lanes unless_left[2] = {all, none}, unless_right[2] = {none, all};
+  LaneBox lefts = left, rights = right;
+  size_t border = 0;
+  for (size_t i = 0; i < refs.size(); ++i) {
+    const BuildRef ref = refs[i];
+    const Lanes centroid = binning_centroid(ref);
+    const bool goes_left = side.left(centroid);
+    const Lanes in_left = lanes_or(centroid, unless_left[goes_left]);
+    const Lanes in_right = lanes_or(centroid, unless_right[goes_left]);
+    lefts.lo = lanes_min(in_left, lefts.lo), lefts.hi = lanes_max(in_left, lefts.hi);
+    rights.lo = lanes_min(in_right, rights.lo), rights.hi = lanes_max(in_right, rights.hi);
+    refs[i] = refs[border];
+    refs[border] = ref;
+    border += goes_left;
   }
+  left = lefts, right = rights;
+  return border;
 }
 
 // A run of references on the wrong side of the final border.

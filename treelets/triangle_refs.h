@@ -2,38 +2,70 @@
 // Called by treelets/build_forest and by the engine where it measures triangles for chunks: both must agree.
 #pragma once
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
+#include "io/huge_memory.h"
 #include "treelets/binned_sah.h"
+#include "treelets/lane_box.h"
 
 namespace shoal {
 
 /// Corners farther out (or not finite) are skipped: up to here no box, grid plane or edge overflows a float.
 inline constexpr float kMaxCoordinate = 0x1p125f;
 
-/// Two corners with equal bits (zeros compared without sign), or a coordinate out of range or not a number.
-inline bool is_degenerate(const float* p) {
-  uint32_t bits[9];
-  for (int i = 0; i < 9; ++i) {
-    if (!(std::fabs(p[i]) <= kMaxCoordinate)) return true;
-    bits[i] = std::bit_cast<uint32_t>(p[i] + 0.0f);  // -0 + 0 = +0
-  }
-  const auto equal = [&bits](int a, int b) { return std::equal(bits + 3 * a, bits + 3 * a + 3, bits + 3 * b); };
-  return equal(0, 1) || equal(1, 2) || equal(2, 0);
+/// The corners of a triangle of nine floats; the last lane of each is something else.
+struct CornerLanes {
+  explicit CornerLanes(const float* p)
+      : a(lanes_load_unaligned(p)),
+        b(lanes_load_unaligned(p + 3)),
+        c(lanes_rotate4(lanes_load_unaligned(p + 5))) {}  // p + 6 would read a float too many
+
+  Lanes a, b, c;
+};
+
+inline bool is_degenerate(const CornerLanes& t) {
+  const auto all_three = [](Lanes lanes) { return (lanes_mask(lanes) & 7) == 7; };
+  const Lanes largest = lanes_set(kMaxCoordinate);
+  const auto in_range = [largest](Lanes corner) { return lanes_at_most(lanes_absolute(corner), largest); };
+  if (!all_three(lanes_and(lanes_and(in_range(t.a), in_range(t.b)), in_range(t.c)))) return true;
+  return all_three(lanes_equal(t.a, t.b)) || all_three(lanes_equal(t.b, t.c)) || all_three(lanes_equal(t.c, t.a));
 }
 
-inline BuildRef make_triangle_ref(const float* p, uint32_t triangle) {
-  BuildRef ref{};
-  ref.id = triangle;
-  for (int axis = 0; axis < 3; ++axis) {
-    // One zero only: the minimum of -0 and +0 would depend on their order.
-    ref.lo[axis] = std::min({p[axis], p[axis + 3], p[axis + 6]}) + 0.0f;
-    ref.hi[axis] = std::max({p[axis], p[axis + 3], p[axis + 6]}) + 0.0f;
-  }
-  return ref;
+/// Two corners with equal bits (zeros compared without sign), or a coordinate out of range or not a number.
+inline bool is_degenerate(const float* p) { return is_degenerate(CornerLanes(p)); }
+
+/// Requires: not degenerate.
+inline BuildRef make_triangle_ref(const CornerLanes& t, uint32_t triangle) {
+  // One zero only: the minimum of -0 and +0 would depend on their order.
+  const Lanes zero = lanes_set(0.0f);
+  alignas(16) float lo[4], hi[4];
+  lanes_store(lanes_add(lanes_min(lanes_min(t.a, t.b), t.c), zero), lo);
+  lanes_store(lanes_add(lanes_max(lanes_max(t.a, t.b), t.c), zero), hi);
+  return {{lo[0], lo[1], lo[2]}, triangle, {hi[0], hi[1], hi[2]}, 0};
 }
+inline BuildRef make_triangle_ref(const float* p, uint32_t triangle) {
+  return make_triangle_ref(CornerLanes(p), triangle);
+}
+
+/// References on large pages of their own.
+class RefArray {
+ public:
+  RefArray() : RefArray(0) {}
+  explicit RefArray(size_t count) : memory_(count), count_(count) {}
+
+  std::span<BuildRef> refs() const { return {memory_.data(), count_}; }
+  size_t size() const { return count_; }
+  /// Forgets those behind the first `count`. Requires: there are as many.
+  void truncate(size_t count) { count_ = count; }
+
+ private:
+  HugeArray<BuildRef> memory_;
+  size_t count_;
+};
+
+/// References to the triangles that are not degenerate, in order; `positions`: nine floats a triangle. Parallel inside.
+RefArray make_refs(std::span<const float> positions);
 
 }  // namespace shoal
