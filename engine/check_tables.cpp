@@ -62,7 +62,7 @@ class TableChecker {
       return Error{ErrorCode::kCorrupt, fmt::format("{}: scene header: {}", scene_.file->path(), what)};
     };
     if (h.version != kSceneVersion) {
-      return corrupt(fmt::format("version: expected {}, found {}", kSceneVersion, h.version));
+      return corrupt(fmt::format("version: expected {}, found {}: build the scene again", kSceneVersion, h.version));
     }
     if (!finite(h.bounds_lo) || !finite(h.bounds_hi)) return corrupt("bounds: expected finite numbers");
     for (int i = 0; i < 3; ++i) {

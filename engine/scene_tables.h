@@ -27,7 +27,7 @@ inline constexpr TableId kSourceFiles = 13;  ///< engine/source_files.h; absent 
 }  // namespace tables
 
 struct SceneHeader {
-  uint32_t version = 1;
+  uint32_t version = 2;
   uint32_t treelet_bytes = 0;        ///< --treelet-size of the build
   uint64_t triangles_count = 0;      ///< stored, an instanced mesh once
   uint64_t instanced_triangles_count = 0;

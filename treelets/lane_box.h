@@ -1,6 +1,6 @@
 // Boxes in four lanes (x, y, z, unused) for the builder's inner loops: SSE2 where the target has it, plain loops
 // else. Both do the same exact operations (min, max, comparisons and single IEEE roundings), so trees are the same.
-// Called by treelets/binned_sah. Plain values.
+// Called by treelets/binned_sah and treelets/triangle_test. Plain values.
 #pragma once
 
 #include <bit>

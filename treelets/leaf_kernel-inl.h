@@ -110,11 +110,9 @@ HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf) {
     auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
     const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
     for (int e = 0; e < 3; ++e) {
-      const auto p1 = hn::Mul(corner[from[e]].x, corner[to[e]].y);
-      const auto p2 = hn::Mul(corner[from[e]].y, corner[to[e]].x);
-      const auto value = hn::Sub(p1, p2);
-      const auto bound =
-          hn::Add(hn::Mul(hn::Set(f, kEdgeError), hn::Add(hn::Abs(p1), hn::Abs(p2))), hn::Set(f, kEdgeUnderflow));
+      const auto product = hn::Mul(corner[from[e]].y, corner[to[e]].x);
+      const auto value = hn::MulSub(corner[from[e]].x, corner[to[e]].y, product);
+      const auto bound = hn::MulAdd(hn::Set(f, kEdgeError), hn::Abs(product), hn::Set(f, kEdgeUnderflow));
       positive = hn::Or(positive, hn::Gt(value, bound));
       negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
     }

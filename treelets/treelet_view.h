@@ -52,7 +52,7 @@ struct LeafView {
   const float* floats(uint32_t axis) const {
     return reinterpret_cast<const float*>(leaf + LeafParts::kPositions) + size_t{axis} * vertex_count;
   }
-  /// Requires for these three: not has_floats(); for high(): the axis has a plane.
+  /// Requires for these three: not has_floats(). high() of an axis without a plane is what follows in the leaf.
   uint32_t base(uint32_t axis) const {
     return reinterpret_cast<const uint32_t*>(leaf + LeafParts::kPositions)[axis];
   }
@@ -67,8 +67,8 @@ struct LeafView {
 
   float coordinate(uint32_t axis, uint32_t vertex) const {
     if (has_floats()) return floats(axis)[vertex];
-    const uint32_t above = has_high(axis) ? uint32_t{high(axis)[vertex]} << 16 : 0;
-    return std::bit_cast<float>(base(axis) + low(axis)[vertex] + above);
+    const uint32_t present = 0u - (header().flags >> axis & 1u);  // else this reads what follows, and drops it
+    return std::bit_cast<float>(base(axis) + low(axis)[vertex] + ((uint32_t{high(axis)[vertex]} & present) << 16));
   }
   Vec3 position(uint32_t triangle, uint32_t k) const {
     const uint32_t vertex = corner(k)[triangle];

@@ -1,18 +1,20 @@
 // The ray-triangle test: watertight (Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection"), both
 // sides. The corners are translated and sheared in float, alike for every triangle that shares them; then the signs
-// of the three edge functions are decided exactly: in float where the rounding error cannot change the sign, else
-// in double, where products of floats are exact. Scalar; the SIMD kernel only rejects what this certainly rejects.
+// of the three edge functions are decided exactly, in double, where products of floats are exact. Scalar; the SIMD
+// kernel (leaf_kernel-inl.h) tests whole leaves in float first and only rejects what this certainly rejects.
 //
-// Error of an edge function e = p1 - p2 of two rounded products (u = 2^-24; the subtraction keeps the sign):
-// |(p1 - p2) - exact| <= u (|p1| + |p2|) + 2^-149, and the sum below is itself rounded; 2u and FLT_MIN cover both.
+// Error of an edge function e = p1 - p2 in float, p2 rounded, p1 rounded or fused (u = 2^-24):
+// |e - exact| <= u |p1| + u |p2| + u |e| + 2^-149 with |p1| <= |p2| + |e| (1 + u), so that the sign is certain when
+// |e| > 3 u |p2| + FLT_MIN.
 #pragma once
 
 #include "treelets/box_test.h"
+#include "treelets/lane_box.h"
 #include "treelets/ray_space.h"
 
 namespace shoal {
 
-inline constexpr float kEdgeError = 2 * kRoundingUnit;
+inline constexpr float kEdgeError = 3 * kRoundingUnit;
 inline constexpr float kEdgeUnderflow = std::numeric_limits<float>::min();
 
 struct TriangleHit {
@@ -31,17 +33,8 @@ inline Sheared shear(const RaySpace& ray, const Vec3& p) {
           z};
 }
 
-template <class T>
-bool of_both_signs(T u, T v, T w) {
-  return (u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0);
-}
-
-/// The edge function of the edge a-b in float; sets `certain` to whether its sign is.
-inline float edge(const Sheared& a, const Sheared& b, bool& certain) {
-  const float p1 = a.x * b.y, p2 = a.y * b.x;
-  const float e = p1 - p2;
-  certain = std::abs(e) > kEdgeError * (std::abs(p1) + std::abs(p2)) + kEdgeUnderflow;
-  return e;
+inline bool of_both_signs(double u, double v, double w) {
+  return ((u < 0) | (v < 0) | (w < 0)) & ((u > 0) | (v > 0) | (w > 0));
 }
 
 inline double exact_edge(const Sheared& a, const Sheared& b) {
@@ -53,9 +46,6 @@ inline double exact_edge(const Sheared& a, const Sheared& b) {
 /// or of a grazing ray by far more than the error of the corners, and a ray would meet the triangle that it leaves.
 inline bool cross_line(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2, TriangleHit& hit) {
   const Sheared a = shear(ray, p0), b = shear(ray, p1), c = shear(ray, p2);
-  bool certain[3];
-  const float u = edge(c, b, certain[0]), v = edge(a, c, certain[1]), w = edge(b, a, certain[2]);
-  if (of_both_signs(certain[0] ? u : 0, certain[1] ? v : 0, certain[2] ? w : 0)) return false;
   const double eu = exact_edge(c, b), ev = exact_edge(a, c), ew = exact_edge(b, a);
   const double det = eu + ev + ew;
   if (of_both_signs(eu, ev, ew) || det == 0) return false;
@@ -67,14 +57,28 @@ inline bool cross_line(const RaySpace& ray, const Vec3& p0, const Vec3& p1, cons
   return true;
 }
 
+/// cross_box() for the triangle's own box, in lanes. Requires: finite corners.
+inline BoxSpan cross_own_box(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2) {
+  const Lanes a = lanes_set(p0.x, p0.y, p0.z), b = lanes_set(p1.x, p1.y, p1.z), c = lanes_set(p2.x, p2.y, p2.z);
+  const Lanes origin = lanes_load3(ray.origin), inverse = lanes_load3(ray.inverse), pad = lanes_set(ray.pad);
+  const Lanes most = lanes_set(std::numeric_limits<float>::max());
+  const Lanes least = lanes_set(-std::numeric_limits<float>::max());
+  const Lanes far_inverse = lanes_min(lanes_max(lanes_mul(inverse, lanes_set(kFarScale)), least), most);
+  const Lanes lo = lanes_sub(lanes_min(lanes_min(a, b), c), lanes_add(origin, pad));
+  const Lanes hi = lanes_sub(lanes_max(lanes_max(a, b), c), lanes_sub(origin, pad));
+  float near[4], far[4];  // lo <= hi: so the lesser product is that of the near plane
+  lanes_store(lanes_min(lanes_mul(lo, inverse), lanes_mul(hi, inverse)), near);
+  lanes_store(lanes_max(lanes_mul(lo, far_inverse), lanes_mul(hi, far_inverse)), far);
+  return {std::max(0.0f, std::max(near[2], std::max(near[1], near[0]))), std::min(far[2], std::min(far[1], far[0]))};
+}
+
 }  // namespace triangle_test
 
 /// The ray meets the triangle at 0 < t <= t_max. t is clamped to the span of the triangle's own box (box_test.h).
 inline bool intersect_triangle(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2, float t_max,
                                TriangleHit& hit) {
   if (!triangle_test::cross_line(ray, p0, p1, p2, hit)) return false;
-  const Vec3 lo = glm::min(glm::min(p0, p1), p2), hi = glm::max(glm::max(p0, p1), p2);
-  const BoxSpan span = cross_box(ray, &lo.x, &hi.x);
+  const BoxSpan span = triangle_test::cross_own_box(ray, p0, p1, p2);
   if (!span.entered(t_max)) return false;
   hit.t = std::min(std::max(hit.t, span.t_near), span.t_far);
   return hit.t > 0 && hit.t <= t_max;
