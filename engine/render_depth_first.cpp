@@ -44,6 +44,7 @@ class DepthFirstWorker {
     PathState state;
     Ray rays[2];
     uint32_t ray_count = 0;
+    TreeletId treelet = kNoIndex;  ///< that this path, or the one before it here, was in last: what changes is counted
   };
 
   void run_paths(const SampleRange& samples) {
@@ -94,7 +95,9 @@ class DepthFirstWorker {
       worker_.shade_miss(state);
       return true;
     }
-    if (!worker_.take_in_hand(state.hit.treelet)) return false;
+    const TreeletId treelet = state.hit.treelet;
+    if (!worker_.hold(treelet)) return false;
+    if (path.treelet != treelet) worker_.count_batch(worker_.held()), path.treelet = treelet;
     path.ray_count = worker_.shade(index, state, path.rays);
     if (path.ray_count == 2) std::swap(path.rays[0], path.rays[1]);  // the shadow ray first
     worker_.let_go();  // the cache may have room for one page a thread
@@ -108,7 +111,10 @@ class DepthFirstWorker {
     pins_[slot].reset();
     pins_[slot] = worker_.pin(treelet);
     treelets_[slot] = treelet;
-    return pins_[slot] ? pins_[slot].bytes().data() : nullptr;
+    if (!pins_[slot]) return nullptr;
+    Path& path = paths_[path_index_of(member.ray)];
+    if (path.treelet != treelet) worker_.count_batch(pins_[slot]), path.treelet = treelet;
+    return pins_[slot].bytes().data();
   }
 
   void drop_rays() {

@@ -112,7 +112,7 @@ class QueuedWorker {
     const auto decide = [this](uint32_t, GroupRay& member, TreeletId treelet) { return route(member, treelet); };
     bool left = true;
     while (!context_.ended.load(std::memory_order_relaxed)) {
-      while (!group_.full()) {
+      while (!group_.full() && !context_.ended.load(std::memory_order_relaxed)) {
         if (fresh_count_ > 0) {
           group_.add(fresh_[--fresh_count_], nullptr);
         } else if (!left || !(left = more())) {

@@ -170,17 +170,26 @@ PagePin RenderWorker::pin(TreeletId treelet) {
     context_.fail(std::move(pin).error());
     return {};
   }
-  ++counters_.treelet_batches_count;
-  counters_.treelet_visit_bytes += pin.value().bytes().size();
   return std::move(pin).value();
 }
 
-bool RenderWorker::take_in_hand(TreeletId treelet) {
-  if (treelet == in_hand_) return true;
+void RenderWorker::count_batch(const PagePin& geometry) {
+  ++counters_.treelet_batches_count;
+  counters_.treelet_visit_bytes += geometry.bytes().size();
+}
+
+bool RenderWorker::hold(TreeletId treelet) {
   let_go();
   geometry_ = pin(treelet);
   if (!geometry_) return false;
   in_hand_ = treelet;
+  return true;
+}
+
+bool RenderWorker::take_in_hand(TreeletId treelet) {
+  if (treelet == in_hand_) return true;
+  if (!hold(treelet)) return false;
+  count_batch(geometry_);
   return true;
 }
 

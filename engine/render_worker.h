@@ -91,7 +91,12 @@ class RenderWorker {
 
   /// The page of a treelet, for one ray or a batch. Nothing on an error (context.ended is set).
   PagePin pin(TreeletId treelet);
+  /// A batch, or a ray, has changed to this treelet: its bytes are taken in hand.
+  void count_batch(const PagePin& geometry);
   /// Pins the treelet; the one before is let go. Returns false on an error (context.ended is set).
+  bool hold(TreeletId treelet);
+  const PagePin& held() const { return geometry_; }
+  /// The same, unless it is in hand already, and counts it as a batch.
   bool take_in_hand(TreeletId treelet);
   TreeletId in_hand() const { return in_hand_; }
   /// The page of the treelet in hand; none when there is no such treelet.

@@ -62,7 +62,7 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
   }
   const LeafView leaf = treelet.leaf(offset);
   const uint32_t triangles = leaf.triangle_count, vertices = leaf.vertex_count;
-  if (triangles < 1 || triangles > kMaxLeafTriangles || vertices < 1 || vertices > kMaxLeafVertices) {
+  if (triangles < 1 || triangles > kMaxLeafTriangles || vertices < 1 || vertices > 3 * triangles) {
     return corrupt(fmt::format("leaf at {} has {} triangles and {} vertices", at, triangles, vertices));
   }
   const uint8_t flags = leaf.header().flags;

@@ -52,7 +52,8 @@ struct LeafView {
   const float* floats(uint32_t axis) const {
     return reinterpret_cast<const float*>(leaf + LeafParts::kPositions) + size_t{axis} * vertex_count;
   }
-  /// Requires for these three: not has_floats(). high() of an axis without a plane is what follows in the leaf.
+  /// Requires for these three: not has_floats(). high() of an axis without a plane is what follows in
+  /// the leaf, whose corners alone are as many bytes (check_treelet: at most three vertices a triangle).
   uint32_t base(uint32_t axis) const {
     return reinterpret_cast<const uint32_t*>(leaf + LeafParts::kPositions)[axis];
   }

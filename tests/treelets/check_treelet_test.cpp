@@ -109,6 +109,59 @@ TEST(CheckTreelet, RejectsRootsOutsideThePage) {
   EXPECT_TRUE(check_root(page.bytes(), kLeafBit).ok());
 }
 
+/// A page of one leaf, its bytes all `fill` after the header.
+AlignedPage one_leaf(const LeafHeader& leaf, uint8_t fill) {
+  TreeletHeader h{};
+  h.magic = kTreeletMagic, h.triangle_count = leaf.triangle_count;
+  h.leaves_offset = sizeof h, h.leaves_bytes = LeafParts::of(leaf).padded_bytes();
+  std::vector<std::byte> page(sizeof h + h.leaves_bytes, std::byte{fill});
+  std::memcpy(page.data(), &h, sizeof h);
+  std::memcpy(page.data() + sizeof h, &leaf, sizeof leaf);
+  return AlignedPage(page);
+}
+
+TEST(CheckTreelet, TakesEveryShapeOfLeafOrRefusesIt) {
+  size_t accepted = 0;
+  for (uint32_t triangles = 0; triangles <= 17; ++triangles) {
+    for (uint32_t vertices = 0; vertices <= 49; ++vertices) {
+      for (uint32_t flags = 0; flags < 32; ++flags) {
+        for (const uint32_t primitive_bytes : {0u, 4u, 5u}) {
+          const LeafHeader leaf{static_cast<uint8_t>(triangles), static_cast<uint8_t>(vertices),
+                                static_cast<uint8_t>(flags), static_cast<uint8_t>(primitive_bytes), 0, 0};
+          const AlignedPage page = one_leaf(leaf, 0);
+          const bool fits = triangles >= 1 && triangles <= 16 && vertices >= 1 && vertices <= 3 * triangles &&
+                            flags < kLeafCoverage && !((flags & kLeafFloats) && (flags & kLeafHighMask)) &&
+                            primitive_bytes <= 4;
+          ASSERT_EQ(check_root(page.bytes(), kLeafBit).ok(), fits)
+              << triangles << " " << vertices << " " << flags << " " << primitive_bytes;
+          if (!fits) continue;
+          ++accepted;
+          Instance instance{};
+          instance.identity = 1, instance.max_abs_coordinate = 1;
+          Ray ray = make_ray({0.1f, 0.2f, -1}, {0.3f, 0.1f, 1});
+          ray.instance = 0;
+          TraceCounters counters;
+          trace_treelet(page.bytes(), {0, kLeafBit}, instance, ray, counters);  // degenerate: nothing to hit
+          EXPECT_FALSE(ray.hit.valid());
+        }
+      }
+    }
+  }
+  EXPECT_GT(accepted, 5000u);
+}
+
+TEST(CheckTreelet, RefusesPackedPositionsThatAreNotFinite) {
+  AlignedPage page = one_leaf({1, 3, 0, 0, 0, 0}, 0);
+  std::byte* positions = page.mutable_bytes().data() + sizeof(TreeletHeader) + sizeof(LeafHeader);
+  const uint32_t largest_float = 0x7f7fffff;
+  std::memcpy(positions + 4, &largest_float, sizeof largest_float);  // base of y
+  EXPECT_TRUE(check_root(page.bytes(), kLeafBit).ok());
+  positions[12 + 2 * 4] = std::byte{1};  // low of the second vertex's y: one step further is infinity
+  const Status status = check_root(page.bytes(), kLeafBit);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
+}
+
 TEST(CheckTreelet, LeavesAtMostTheAgreedDepth) {
   const auto chain = [](uint32_t nodes) {
     TreeletHeader h{};
