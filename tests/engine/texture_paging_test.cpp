@@ -22,7 +22,7 @@ TEST(TexturePaging, GivesTheSameBitsWhenTilesDoNotFit) {
   picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(1), {}};
 
   std::vector<float> expected;
-  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted}) {
     for (const bool room : {true, false}) {
       ExecutionOptions execution;
       execution.order = order;
