@@ -205,7 +205,7 @@ TEST_F(RenderOrders, ASampleOfTilesHasThePixelsOfTheWholePicture) {
 
 TEST_F(RenderOrders, CountEveryRayOfAScene) {
   // A render whose counters do not balance fails, so what is left to show is that they count this scene's rays.
-  const std::string gltf = generated("terrain", 20000);
+  const std::string gltf = generated("terrain", 60000);
   const std::string shoal = (folder_ / "count.shoal").string();
   ASSERT_TRUE(build_scene(posix_file_system(), gltf, shoal, {}).ok());
   const auto scene = open_scene(posix_file_system(), shoal, ReadMode::kBuffered, {});
