@@ -55,7 +55,7 @@ class EmbreeTracer {
 
  private:
   void trace_single(uint64_t first, uint64_t last) {
-    const RaySorter* sorter = run_.sorter;
+    const TeamSorter* sorter = run_.sorter;
     for (uint64_t place = first; place < last; ++place) {
       const uint64_t index = sorter != nullptr ? sorter->ray_at(place) : place;
       if (sorter != nullptr) __builtin_prefetch(&set_.rays[sorter->ray_at(std::min(place + kFetchAhead, last - 1))]);

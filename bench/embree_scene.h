@@ -46,7 +46,7 @@ enum class EmbreeCall {
 struct EmbreeRun {
   EmbreeCall call = EmbreeCall::kSingle;
   uint64_t stream_rays = 1024;   ///< a call of kStream
-  RaySorter* sorter = nullptr;   ///< not null: kSingle over sorted rays, the sort within the time
+  TeamSorter* sorter = nullptr;   ///< not null: kSingle over sorted rays, the sort within the time
 };
 
 /// Traces all rays; any-hit rays by the rtcOccluded calls. The context says coherent where the set does.

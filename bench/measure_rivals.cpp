@@ -132,7 +132,7 @@ class RivalRun {
   const RaySet& set_;
   const MeasureOptions& options_;
   RivalRow row_;
-  RaySorter sorter_;  ///< Embree's
+  TeamSorter sorter_;  ///< Embree's
   std::unique_ptr<RayOrder> orders_[kOrderCount];
   LargeVector<RayAnswer> ours_, answers_;
   std::vector<Turns> turns_;

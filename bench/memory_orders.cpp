@@ -44,7 +44,7 @@ class DepthFirstTracer {
 /// Each ray to its end, in the order given or sorted first.
 class DepthFirstOrder : public RayOrder {
  public:
-  DepthFirstOrder(const MemoryScene& scene, unsigned threads, std::unique_ptr<RaySorter> sorter)
+  DepthFirstOrder(const MemoryScene& scene, unsigned threads, std::unique_ptr<TeamSorter> sorter)
       : scene_(scene), threads_(threads), sorter_(std::move(sorter)) {}
 
   OrderRun run(const RaySet& set, std::span<RayAnswer> answers) override {
@@ -80,7 +80,7 @@ class DepthFirstOrder : public RayOrder {
 
   const MemoryScene& scene_;
   unsigned threads_;
-  std::unique_ptr<RaySorter> sorter_;
+  std::unique_ptr<TeamSorter> sorter_;
 };
 
 }  // namespace
@@ -114,9 +114,9 @@ void trace_to_end(const MemoryScene& scene, Ray& ray) {
 std::unique_ptr<RayOrder> make_order(MemoryOrder order, const MemoryScene& scene, const OrderOptions& options,
                                      uint64_t ray_count) {
   if (order == MemoryOrder::kQueued) return make_queued_order(scene, options, ray_count);
-  std::unique_ptr<RaySorter> sorter;
+  std::unique_ptr<TeamSorter> sorter;
   if (order == MemoryOrder::kSorted) {
-    sorter = std::make_unique<RaySorter>(scene.top_tree().bounds(), options.threads, ray_count);
+    sorter = std::make_unique<TeamSorter>(scene.top_tree().bounds(), options.threads, ray_count);
   }
   return std::make_unique<DepthFirstOrder>(scene, options.threads, std::move(sorter));
 }

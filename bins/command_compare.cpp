@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
@@ -94,7 +95,7 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("compare", "the same picture in several orders, and what each moved");
   arguments->render.declare(*sub);
-  sub->add_option("--orders", arguments->orders, "comma-separated: queued, depth-first")
+  sub->add_option("--orders", arguments->orders, "comma-separated: " + choice_names(order_choices()))
       ->delimiter(',')
       ->capture_default_str();
   sub->add_option("--out", arguments->out, "folder for compare.json")->required();

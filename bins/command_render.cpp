@@ -66,6 +66,7 @@ int run_render(const Arguments& arguments, Console& console) {
   PreparedRender& p = prepared.value();
   RenderHooks hooks = console_hooks(console);
   hooks.planned = [&console](const MemoryPlan& plan) { console.info(describe_plan(plan)); };
+  hooks.chosen = [&console](const ChosenOrder& chosen) { console.info(describe_order(chosen)); };
   const auto result = render(posix_file_system(), p.scene, p.picture, p.execution, hooks);
   console.end_progress();
   if (!result.ok()) return console.error(result.error());
@@ -77,7 +78,7 @@ int run_render(const Arguments& arguments, Console& console) {
                                 result.value().counters.invalid_samples_count));
   }
   if (console.level >= LogLevel::kInfo) {
-    fmt::print("{}", traffic_table({{std::string(order_name(p.execution.order)), &result.value()}}));
+    fmt::print("{}", traffic_table({{std::string(order_name(result.value().order.order)), &result.value()}}));
   }
   return 0;
 }

@@ -149,7 +149,10 @@ Result<EnvironmentOptions> parse_environment(const std::string& text) {
 }
 
 const std::map<std::string, Order>& order_choices() {
-  static const std::map<std::string, Order> kOrders{{"queued", Order::kQueued}, {"depth-first", Order::kDepthFirst}};
+  static const std::map<std::string, Order> kOrders{{"auto", Order::kAuto},
+                                                     {"queued", Order::kQueued},
+                                                     {"depth-first", Order::kDepthFirst},
+                                                     {"sorted", Order::kSorted}};
   return kOrders;
 }
 
@@ -301,6 +304,10 @@ std::string describe_plan(const MemoryPlan& plan) {
                             format_bytes(plan.geometry_page_bytes), format_bytes(plan.attribute_page_bytes),
                             format_bytes(plan.texture_page_bytes), format_bytes(plan.read_buffer_bytes),
                             format_bytes(plan.scratch_bytes));
+}
+
+std::string describe_order(const ChosenOrder& chosen) {
+  return fmt::format("order: {} ({})", order_name(chosen.order), chosen.reason);
 }
 
 std::string describe_plan(const BuildMemoryPlan& plan) {

@@ -64,6 +64,8 @@ const std::atomic<bool>* stop_on_signals();
 RenderHooks console_hooks(Console& console);
 /// The memory plan as one log line.
 std::string describe_plan(const MemoryPlan& plan);
+/// The order that was chosen, and why, as one log line.
+std::string describe_order(const ChosenOrder& chosen);
 std::string describe_plan(const BuildMemoryPlan& plan);
 /// Build progress on the console.
 std::function<void(const BuildProgress&)> build_progress(Console& console);

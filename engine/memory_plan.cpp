@@ -12,6 +12,7 @@
 #include "engine/process_memory.h"
 #include "engine/queued_paths.h"
 #include "engine/render.h"
+#include "engine/sorted_paths.h"
 #include "engine/split_memory.h"
 #include "io/image.h"
 #include "io/page_cache.h"
@@ -94,8 +95,19 @@ unsigned read_depth_within(const PageFile& file, const PagingOptions& asked, uin
   return depth < std::min(asked.read_depth, kLeastReadDepth) ? 0 : depth;
 }
 
-Result<MemoryPlan> share_out(const SceneSizes& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
-  const bool queued = execution.order == Order::kQueued;
+/// Of so many paths in flight and their rays. Of all orders that may be chosen, the most.
+uint64_t waiting_bytes(Order order, uint32_t treelet_count, uint32_t paths, unsigned threads) {
+  const uint64_t queued = QueuedPaths::bytes(treelet_count, paths, threads);
+  const uint64_t sorted = SortedPaths::bytes(paths, threads);
+  if (order == Order::kAuto) return std::max(queued, sorted);
+  return order == Order::kSorted ? sorted : queued;
+}
+
+/// `order`: of kAuto, all of them.
+Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const PictureOptions& picture,
+                             const ExecutionOptions& execution) {
+  const bool queued = order == Order::kQueued || order == Order::kAuto;
+  const bool waits = order != Order::kDepthFirst;
   const unsigned threads = execution.threads > 0 ? execution.threads : std::max(1u, std::thread::hardware_concurrency());
   const uint64_t samples = uint64_t{picture.width} * picture.height * picture.samples;
   MemoryPlan plan = fixed_parts(scene, picture, execution, threads);
@@ -106,7 +118,7 @@ Result<MemoryPlan> share_out(const SceneSizes& scene, const PictureOptions& pict
                              "that works is {} bytes", execution.page_cache_bytes, threads, least_cache)};
   }
   const auto paths_bytes = [&](uint64_t paths) {
-    return queued ? QueuedPaths::bytes(scene.treelet_count, static_cast<uint32_t>(paths), threads) : 0;
+    return waits ? waiting_bytes(order, scene.treelet_count, static_cast<uint32_t>(paths), threads) : 0;
   };
   uint64_t asked_paths = std::min<uint64_t>((execution.rays_in_flight + 1) / 2, kMaxPathsInFlight);
   if (execution.rays_in_flight > 0) asked_paths = std::max<uint64_t>(asked_paths, kRaysPerBlock / 2);
@@ -130,18 +142,31 @@ Result<MemoryPlan> share_out(const SceneSizes& scene, const PictureOptions& pict
     left -= buffers;
   }
   uint64_t paths = asked_paths;
-  if (paths == 0 && queued) {
+  if (paths == 0 && waits) {
     paths = choose_paths_in_flight({left, plan.scene_page_bytes(), scene.treelet_count, least_pages, least_paths,
                                     std::min<uint64_t>(samples, kMaxPathsInFlight), paths_bytes});
   }
-  plan.paths_in_flight = static_cast<uint32_t>(queued ? paths : threads);
-  if (queued) {
-    plan.path_state_bytes = QueuedPaths::state_bytes(scene.treelet_count, plan.paths_in_flight);
+  plan.paths_in_flight = static_cast<uint32_t>(waits ? paths : threads);
+  if (waits) {
+    plan.path_state_bytes = order == Order::kSorted
+                                ? SortedPaths::state_bytes(plan.paths_in_flight)
+                                : QueuedPaths::state_bytes(scene.treelet_count, plan.paths_in_flight);
     plan.ray_bytes = paths_bytes(paths) - plan.path_state_bytes;
   }
   plan.cache_bytes = std::min(left - plan.paths_bytes(), std::max(plan.scene_page_bytes(), least_cache));
   if (execution.page_cache_bytes > 0) plan.cache_bytes = execution.page_cache_bytes;
   return plan;
+}
+
+/// What may be chosen is planned as the queued order, which is what runs where pages do not fit; with room for every order
+/// where all fit beside every page.
+Result<MemoryPlan> share_out(const SceneSizes& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
+  if (execution.order != Order::kAuto) return share_out(execution.order, scene, picture, execution);
+  SHOAL_ASSIGN_OR_RETURN(const MemoryPlan queued, share_out(Order::kQueued, scene, picture, execution));
+  Result<MemoryPlan> all = share_out(Order::kAuto, scene, picture, execution);
+  if (!all.ok() || all.value().cache_bytes < all.value().scene_page_bytes()) return queued;
+  all.value().every_order_fits = true;
+  return all;
 }
 
 /// Decoded size of a table; one that is absent is found out when it is read.

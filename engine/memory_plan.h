@@ -32,6 +32,7 @@ struct MemoryPlan {
   uint64_t read_buffer_bytes = 0;  ///< pages on their way from the disk
   uint64_t scratch_bytes = 0;      ///< stacks, the cache's bookkeeping, the allocator's slack
   uint32_t paths_in_flight = 0;
+  bool every_order_fits = false;   ///< Order::kAuto: beside every page there is room for what each order needs
   unsigned read_depth = 0;         ///< reads ahead at once: at most PagingOptions::read_depth
   // All pages decoded: what the cache would hold if it could.
   uint64_t geometry_page_bytes = 0, attribute_page_bytes = 0, texture_page_bytes = 0;

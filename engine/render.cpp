@@ -5,22 +5,11 @@
 #include <thread>
 
 #include "engine/clock.h"
+#include "engine/order_runner.h"
 #include "engine/preview.h"
-#include "engine/queued_paths.h"
-#include "engine/render_worker.h"
-#include "engine/treelet_scheduler.h"
 
 namespace shoal {
 namespace {
-
-/// What a texture tile counts for when pages are evicted, in rays: nothing waits for a tile by name, but dropping tiles
-/// first read 1.7 times the bytes and 8 times the pages of dropping treelets with fewer waiting rays before them
-/// (demo scene, 480 x 270, 2 spp, cap 80M; 1024 instead of 64 made no difference).
-constexpr uint64_t kTextureTileWork = 64;
-/// What it counts for besides where usual demand counts: a tile is a sixteenth of a treelet, and who misses it waits for
-/// the disk. With nothing, treelets that were crowded before kept tiles out: 116,567 tiles read instead of 747, three
-/// times the time (demo scene, 480 x 270, 2 spp, cap 80M).
-constexpr uint64_t kTextureTileDemand = 1u << 14;
 
 Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
   SHOAL_RETURN_IF_ERROR(check_picture(picture));
@@ -48,16 +37,6 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
-/// What waits for each page, for eviction and reads ahead. Requires: what is passed outlives it.
-WaitingWork make_waiting_work(const QueuedPaths& paths, const UsualBatches& batches,
-                              std::span<const TreeletId> page_treelets) {
-  return [&paths, &batches, page_treelets](PageId page) {
-    const TreeletId treelet = page_treelets[page];
-    return treelet == kNoIndex ? PageDemand(kTextureTileWork, kTextureTileDemand)
-                               : PageDemand(paths.waiting(treelet), batches.of(treelet));
-  };
-}
-
 /// What a complete render leaves. Ends the preview, whose memory goes before that of the floats is taken.
 RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::optional<Preview>& preview) {
   const PictureOptions& picture = context.picture;
@@ -83,6 +62,16 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
 }
 
 }  // namespace
+
+std::string_view order_name(Order order) {
+  switch (order) {
+    case Order::kAuto: return "auto";
+    case Order::kQueued: return "queued";
+    case Order::kDepthFirst: return "depth-first";
+    case Order::kSorted: return "sorted";
+  }
+  return "";
+}
 
 Status check_picture(const PictureOptions& picture) {
   if (picture.width == 0 || picture.height == 0 || picture.width > 65536 || picture.height > 65536 ||
@@ -118,39 +107,24 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   Film film(picture.width, picture.height);
   std::optional<Preview> preview;
   if (previewed) preview.emplace(fs, execution.preview, film, samples, execution.threads, start, hooks.warning);
-  const bool queued = execution.order == Order::kQueued;
-  std::unique_ptr<QueuedPaths> paths;
-  const std::vector<TreeletId> page_treelets = treelet_of_pages(scene);
-  UsualBatches batches(scene.treelets.size());
-  WaitingWork waiting;
-  if (queued) {
-    paths = std::make_unique<QueuedPaths>(static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight,
-                                          execution.threads);
-    waiting = make_waiting_work(*paths, batches, page_treelets);
-  }
+  OrderRunner orders(scene, execution, plan, samples.count());
   PageCache cache(*scene.file, plan.cache_bytes,
                   [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
                     return check_page(scene, record, bytes);
                   },
-                  waiting, execution.paging);
+                  orders.waiting_work(), execution.paging);
   if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
   if (preview) context.preview = &*preview;
-  if (queued) {
-    const std::unique_ptr<DrainPolicy> policy = make_drain_policy(
-        execution.policy, scaled_policy(execution.policy_options, execution.paging,
-                                        static_cast<uint32_t>(scene.treelets.size()), plan.paths_in_flight));
-    TreeletScheduler scheduler(scene, *paths, cache, *policy, batches, page_treelets);
-    render_queued(context, *paths, scheduler, batches);
-  } else {
-    render_depth_first(context);
-  }
+  const ChosenOrder chosen = orders.run(context);
   cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
-  return finish_result(context, plan, preview);
+  RenderResult result = finish_result(context, plan, preview);
+  result.order = chosen;
+  return result;
 }
 
 }  // namespace shoal

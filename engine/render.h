@@ -1,4 +1,4 @@
-// Rendering: options, and the two orders over the same treelets, pages and kernels.
+// Rendering: options, and the orders over the same treelets, pages and kernels.
 // Called by bins and tests. The picture depends on the scene and on PictureOptions only; everything in
 // ExecutionOptions changes time and traffic, never a bit.
 #pragma once
@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/counters.h"
@@ -29,7 +30,15 @@ struct PictureOptions {
   ShadingOptions shading;
 };
 
-enum class Order : uint8_t { kQueued, kDepthFirst };
+enum class Order : uint8_t { kAuto, kQueued, kDepthFirst, kSorted };
+
+std::string_view order_name(Order order);
+
+/// The order that renders, never kAuto, and why.
+struct ChosenOrder {
+  Order order = Order::kQueued;
+  std::string reason;
+};
 
 /// A picture that is written while the render goes on (engine/preview.h).
 struct PreviewOptions {
@@ -38,7 +47,7 @@ struct PreviewOptions {
 };
 
 struct ExecutionOptions {
-  Order order = Order::kQueued;
+  Order order = Order::kAuto;       ///< kAuto: what is fastest for scene and cap (engine/choose_order.h)
   unsigned threads = 0;             ///< 0: all
   uint64_t max_memory_bytes = 0;    ///< of the whole process; 0: default_cap_bytes() (engine/process_memory.h)
   uint64_t process_bytes = 0;       ///< of plan_before_tables(), so that every plan says the same; 0: measured
@@ -67,6 +76,7 @@ struct RenderProgress {
 
 struct RenderHooks {
   std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
+  std::function<void(const ChosenOrder&)> chosen;       ///< may be empty; called once for Order::kAuto
   std::function<void(const RenderProgress&)> progress;  ///< may be empty; now and then, one call at a time
   std::function<void(const std::string&)> warning;      ///< may be empty; what went wrong and does not end the render
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
@@ -76,6 +86,7 @@ struct RenderResult {
   std::vector<float> rgba;  ///< width * height * 4
   RenderCounters counters;
   MemoryPlan plan;
+  ChosenOrder order;
   double seconds = 0;
   unsigned threads = 0;
   uint64_t peak_cache_bytes = 0;

@@ -29,7 +29,7 @@ class DepthFirstWorker {
     while (!context_.ended.load(std::memory_order_relaxed)) {
       const bool first_lattice = context_.next_sample < context_.samples.first_lattice_count();
       const SampleRange samples = context_.begin_samples(first_lattice ? kFirstSamplesPerGrab : kSamplesPerGrab);
-      if (samples.first == context_.samples.count()) break;
+      if (samples.first >= context_.end_sample) break;
       run_paths(samples);
       context_.samples_done += samples.size();
       worker_.report_progress();
@@ -137,7 +137,7 @@ class DepthFirstWorker {
 }  // namespace
 
 void render_depth_first(RenderContext& context) {
-  run_on_threads(context, [&] { std::make_unique<DepthFirstWorker>(context)->run(); });
+  run_on_threads(context, [&](unsigned) { std::make_unique<DepthFirstWorker>(context)->run(); });
 }
 
 }  // namespace shoal

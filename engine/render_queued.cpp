@@ -27,7 +27,7 @@ class QueuedWorker {
         admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)) {}
 
   void run() {
-    while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.samples.count()) {
+    while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.end_sample) {
       while (room_for(admit_batch_)) {
         admit(admit_batch_);
         worker_.report_progress();  // paths that see nothing end at once, and leave room for more
@@ -183,7 +183,7 @@ class QueuedWorker {
 }  // namespace
 
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches) {
-  run_on_threads(context, [&] { std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run(); });
+  run_on_threads(context, [&](unsigned) { std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run(); });
 }
 
 }  // namespace shoal

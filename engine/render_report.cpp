@@ -104,7 +104,9 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"bounces", picture.shading.bounces},
           {"seed", picture.shading.seed},
           {"environment", environment_text(picture.shading.environment)},
-          {"order", order_name(execution.order)},
+          {"order", order_name(result.order.order)},
+          {"order_asked", order_name(execution.order)},
+          {"order_reason", result.order.reason},
           {"policy", execution.policy},
           {"queue_capacity", execution.policy_options.queue_capacity},
           {"rays_ahead", execution.policy_options.rays_ahead},
@@ -119,8 +121,6 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
 }
 
 }  // namespace
-
-std::string_view order_name(Order order) { return order == Order::kQueued ? "queued" : "depth-first"; }
 
 std::string format_bytes(uint64_t bytes) {
   static constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};

@@ -10,8 +10,6 @@
 
 namespace shoal {
 
-std::string_view order_name(Order order);
-
 /// R,G,B,A as float with the attributes of docs/design.md: software, renderTimeSeconds, samplesPerPixel, worldToCamera,
 /// worldToNDC.
 ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture);

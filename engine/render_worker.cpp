@@ -57,10 +57,10 @@ void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work)
   tell_sanitizer_after(&work);
 }
 
-void run_on_threads(RenderContext& context, const std::function<void()>& work) {
-  run_on_threads(context.threads, [&](unsigned) {
+void run_on_threads(RenderContext& context, const std::function<void(unsigned)>& work) {
+  run_on_threads(context.threads, [&](unsigned thread) {
     try {
-      work();
+      work(thread);
     } catch (const std::bad_alloc&) {
       context.ended = true;  // first: the message allocates
       context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});

@@ -1,5 +1,5 @@
 // What a rendering thread does to a path in any order: beginning it, finishing its rays, shading its vertices, ending
-// it. The orders (render_depth_first, render_queued) decide only when and where. One worker a thread.
+// it. The orders (render_depth_first, render_sorted, render_queued) decide only when and where. One worker a thread.
 #pragma once
 
 #include <atomic>
@@ -37,6 +37,8 @@ struct RenderContext {
   unsigned threads;
   Preview* preview = nullptr;  ///< or none
 
+  /// Samples that begin until the order ends: all, but for trials (engine/order_runner.h). Set while no order runs.
+  uint64_t end_sample = 0;
   std::atomic<uint64_t> next_sample{0};
   std::atomic<uint64_t> samples_done{0};
   std::atomic<uint64_t> disk_read_bytes{0};
@@ -55,11 +57,13 @@ struct RenderContext {
   /// With a preview nothing else begins before the first lattice is complete. Else policies would drain the large
   /// queues of later samples first, and the lattice's few rays would wait.
   uint64_t begin_limit() const {
-    return samples_done >= samples.first_lattice_count() ? samples.count() : samples.first_lattice_count();
+    const uint64_t lattice = samples.first_lattice_count();
+    return samples_done >= lattice ? end_sample : std::min(end_sample, lattice);
   }
 };
 
 class QueuedPaths;
+class SortedPaths;
 class TreeletScheduler;
 class UsualBatches;
 
@@ -134,14 +138,15 @@ class RenderWorker {
 /// What a cache counted joins the counters of the render.
 void add_cache_counters(const CacheCounters& cache, RenderCounters& counters);
 
-/// The two orders. Both return when every sample is in the film or context.ended is set.
+/// The orders. Each returns when every sample is in the film or context.ended is set.
 void render_depth_first(RenderContext& context);
+void render_sorted(RenderContext& context, SortedPaths& paths);
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches);
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work);
 /// The same on the threads of a render. Memory that runs out in one of them ends it for all: they would wait for its
 /// rays or samples for ever.
-void run_on_threads(RenderContext& context, const std::function<void()>& work);
+void run_on_threads(RenderContext& context, const std::function<void(unsigned)>& work);
 
 }  // namespace shoal

@@ -68,7 +68,7 @@ TEST(BadLuck, ASceneCutShortUnderARenderEndsIt) {
   make_terrain(folder, "50K");
   expect_exit(run_shoal(folder, {"build", folder / "terrain/terrain.gltf", "-o", folder / "small-pages.shoal",
                                  "--treelet-size", "16K", "--quiet"}), 0);
-  for (const std::string order : {"queued", "depth-first"}) {
+  for (const std::string order : {"queued", "depth-first", "sorted"}) {
     std::filesystem::copy_file(folder / "small-pages.shoal", folder / "cut.shoal",
                                std::filesystem::copy_options::overwrite_existing);
     Program program(folder, {SHOAL_BINARY, "render", folder / "cut.shoal", "-o", folder / "o.exr", "--order", order,

@@ -115,18 +115,39 @@ TEST(RenderScene, GeneratedTerrainGoesFromTrianglesToPicture) {
   EXPECT_GT(stats["memory"]["peak_rss_bytes"], 1u << 20);
 }
 
+TEST(RenderScene, TheOrderIsChosenUnlessItIsNamedAndSaysWhy) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const std::vector<std::string> render = join({"render", folder / "terrain.shoal", "-o", folder / "out.exr", "--stats",
+                                                folder / "out.json"}, tiny_picture());
+  const ProgramRun chosen = run_shoal(folder, render);
+  expect_exit(chosen, 0);
+  EXPECT_THAT(chosen.err, HasSubstr("order: queued (too few samples to try others)"));
+  json options = parsed(file_text(folder / "out.json"))["options"];
+  EXPECT_EQ(options["order"], "queued");
+  EXPECT_EQ(options["order_asked"], "auto");
+  EXPECT_EQ(options["order_reason"], "too few samples to try others");
+  const ProgramRun named = run_shoal(folder, join(render, {"--order", "sorted"}));
+  expect_exit(named, 0);
+  EXPECT_THAT(named.err, ::testing::Not(HasSubstr("order:")));
+  options = parsed(file_text(folder / "out.json"))["options"];
+  EXPECT_EQ(options["order"], "sorted");
+  EXPECT_EQ(options["order_asked"], "sorted");
+  EXPECT_EQ(options["order_reason"], "asked for");
+}
+
 TEST(RenderScene, CompareFindsTheOrdersIdentical) {
   const TemporaryFolder folder;
   make_terrain(folder);
   const ProgramRun run = run_shoal(folder, join({"compare", folder / "terrain.shoal", "--orders",
-                                                 "queued,depth-first", "--out", folder / "compare"},
+                                                 "queued,depth-first,sorted", "--out", folder / "compare"},
                                                 tiny_picture()));
   expect_exit(run, 0);
   EXPECT_THAT(run.out, HasSubstr("identical"));
   const json report = parsed(file_text(folder / "compare/compare.json"));
   EXPECT_EQ(report["pictures_identical"], true);
   ASSERT_TRUE(report["orders"].contains("queued") && report["orders"].contains("depth-first"));
-  for (const char* order : {"queued", "depth-first"}) {
+  for (const char* order : {"queued", "depth-first", "sorted"}) {
     expect_stats(report["orders"][order], 24 * 16);
     EXPECT_EQ(report["orders"][order]["options"]["order"], order);
     const bool ahead = report["orders"][order]["options"]["read_backend"].get<std::string>() != "none";

@@ -25,7 +25,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
-                  "--tonemap", "--exposure",   "--stats",          "--order",     "queued, depth-first"}},
+                  "--tonemap", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted"}},
       {"compare", {"--orders", "--out", "--width", "--spp", "--max-memory"}},
       {"info", {"--json"}},
       {"verify", {"file"}},
@@ -76,7 +76,7 @@ TEST(Usage, ValuesThatAreNotOfTheirKindExitTwoAndAreNamed) {
   expect_usage(run_shoal(folder, join(render, {"--spp", "many"})), {"--spp", "many"});
   expect_usage(run_shoal(folder, join(render, {"--width", "-3"})), {"--width", "-3"});
   expect_usage(run_shoal(folder, join(render, {"--order", "random"})),
-               {"--order", "queued, depth-first", "'random'"});
+               {"--order", "auto, queued, depth-first, sorted", "'random'"});
   expect_usage(run_shoal(folder, join(render, {"--progress", "loud"})), {"--progress", "json", "'loud'"});
   expect_usage(run_shoal(folder, join(render, {"--log-level", "loud"})), {"--log-level", "warning", "'loud'"});
   expect_usage(run_shoal(folder, join(render, {"--state-levels", "33"})), {"--state-levels", "33"});
@@ -126,7 +126,7 @@ TEST(Usage, WhatDoesNotFitTheSceneExitsTwo) {
   expect({"--policy", "laziest"}, {"unknown policy 'laziest'", "resident-first", "sweep"});
   expect_error(run_shoal(folder, {"compare", folder / "terrain.shoal", "--orders", "queued,zigzag", "--out",
                                   folder / "c", "--width", "8", "--height", "8", "--spp", "1"}),
-               2, {"unknown order 'zigzag'", "queued, depth-first"});
+               2, {"unknown order 'zigzag'", "auto, queued, depth-first, sorted"});
   EXPECT_THAT(folder.names(), ::testing::ElementsAre("terrain", "terrain.shoal"));
 }
 

@@ -1,4 +1,4 @@
-// Whatever read fails in the middle of a render, in either order: it ends with the right code and names file and page; a
+// Whatever read fails in the middle of a render, in any order: it ends with the right code and names file and page; a
 // read ahead that fails harms nothing, or ends the render likewise.
 #include <gtest/gtest.h>
 
@@ -25,6 +25,8 @@ struct Way {
 
 const Way kWays[] = {{"depth-first", Order::kDepthFirst, 1, 0},
                      {"depth-first, two threads", Order::kDepthFirst, 2, 0},
+                     {"sorted", Order::kSorted, 1, 0},
+                     {"sorted, two threads", Order::kSorted, 2, 0},
                      {"queued", Order::kQueued, 1, 0},
                      {"queued, reading ahead", Order::kQueued, 2, 8},
                      {"depth-first, two threads, with a preview", Order::kDepthFirst, 2, 0, true},
@@ -129,7 +131,7 @@ TEST_F(BadLuckRender, AStopIsHeardWhereCameraRaysSeeNothing) {
   CameraRecord camera = frame_camera(scene.value().top_tree.bounds());
   camera.camera_to_world.translation = camera.camera_to_world.translation + Vec3{1e6f, 0, 0};
   scene.value().cameras = {camera};
-  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kAuto}) {
     PictureOptions picture;
     picture.width = picture.height = 256;
     picture.samples = 1u << 16;  // minutes, were it not stopped

@@ -1,11 +1,12 @@
-// The promise that the order is invisible: queued = depth-first to the bit, over treelet sizes, rays in flight, page
-// caches, threads, policies and traversal states, on generated scenes and on real ones.
+// The promise that the order is invisible: queued = depth-first = sorted to the bit, over treelet sizes, rays in
+// flight, page caches, threads, policies and traversal states, on generated scenes and on real ones.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <vector>
 
 #include "engine/build_scene.h"
 #include "engine/generate.h"
@@ -57,6 +58,20 @@ const Variation kVariations[] = {
      .smallest_cache = true, .preview = true},
     {.name = "with a preview, one thread, full", .threads = 1, .rays_in_flight = 20000, .policy = "full",
      .queue_capacity = 100, .preview = true},
+    {.name = "sorted", .order = Order::kSorted},
+    {.name = "sorted, waves of 32 paths", .order = Order::kSorted, .threads = 1, .rays_in_flight = 64},
+    {.name = "sorted, more threads than processors", .order = Order::kSorted, .threads = 3, .rays_in_flight = 5000},
+    {.name = "sorted, smallest cache", .order = Order::kSorted, .threads = 3, .rays_in_flight = 1000,
+     .smallest_cache = true},
+    {.name = "sorted, one thread, smallest cache", .order = Order::kSorted, .threads = 1, .smallest_cache = true},
+    {.name = "sorted, treelets of 4 KiB, no traversal state", .treelet_bytes = 4u << 10, .order = Order::kSorted,
+     .more_levels = 0},
+    {.name = "sorted, treelets of 4 KiB, smallest cache", .treelet_bytes = 4u << 10, .order = Order::kSorted,
+     .smallest_cache = true},
+    {.name = "sorted, with a preview", .order = Order::kSorted, .threads = 3, .rays_in_flight = 3000, .preview = true},
+    {.name = "auto", .order = Order::kAuto},
+    {.name = "auto, smallest cache", .order = Order::kAuto, .threads = 3, .smallest_cache = true},
+    {.name = "auto, with a preview", .order = Order::kAuto, .threads = 1, .preview = true},
     {.name = "treelets of 4 MiB", .treelet_bytes = 4u << 20},
     {.name = "treelets of 64 KiB, depth-first", .treelet_bytes = 64u << 10, .order = Order::kDepthFirst},
 };
@@ -196,21 +211,59 @@ TEST_F(RenderOrders, CountEveryRayOfAScene) {
   const auto scene = open_scene(posix_file_system(), shoal, ReadMode::kBuffered, {});
   ASSERT_TRUE(scene.ok());
   const PictureOptions picture = small_picture(0);
-  RayCounters totals[2];
-  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+  std::vector<RayCounters> totals;
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted}) {
     ExecutionOptions execution;
     execution.order = order;
     execution.threads = 2;
     const auto result = render(posix_file_system(), scene.value(), picture, execution);
     ASSERT_TRUE(result.ok()) << result.error().message;
-    totals[order == Order::kQueued ? 0 : 1] = result.value().counters.total();
+    EXPECT_EQ(result.value().order.order, order);
+    totals.push_back(result.value().counters.total());
     EXPECT_EQ(result.value().counters.of_kind(RayKind::kCamera).rays_traced_count, 48u * 40 * 3);
     EXPECT_GT(result.value().counters.of_kind(RayKind::kShadow).rays_traced_count, 0u);
+    EXPECT_EQ(result.value().counters.ray_moved_bytes > 0, order != Order::kDepthFirst);
   }
-  EXPECT_EQ(totals[0].rays_traced_count, totals[1].rays_traced_count);
-  EXPECT_EQ(totals[0].ray_hits_count, totals[1].ray_hits_count);
+  for (const RayCounters& total : totals) {
+    EXPECT_EQ(total.rays_traced_count, totals[0].rays_traced_count);
+    EXPECT_EQ(total.ray_hits_count, totals[0].ray_hits_count);
+    EXPECT_EQ(total.node_tests_count, totals[0].node_tests_count) << "trials count on it";
+    EXPECT_EQ(total.triangle_tests_count, totals[0].triangle_tests_count) << "trials count on it";
+  }
   EXPECT_GT(totals[0].rays_queued_count, totals[0].rays_traced_count / 2);
   EXPECT_EQ(totals[1].rays_queued_count, 0u);
+  EXPECT_EQ(totals[2].rays_queued_count, 0u);
+}
+
+TEST_F(RenderOrders, ARenderThatIsLongEnoughTriesTheOrders) {
+  const std::string gltf = generated("terrain", 5000);
+  const std::string shoal = (folder_ / "tried.shoal").string();
+  ASSERT_TRUE(build_scene(posix_file_system(), gltf, shoal, {}).ok());
+  const auto scene = open_scene(posix_file_system(), shoal, ReadMode::kBuffered, {});
+  ASSERT_TRUE(scene.ok());
+  PictureOptions picture = small_picture(1);
+  picture.width = picture.height = 128, picture.samples = 64;  // the fewest that are tried: 2^20
+  picture.shading.bounces = 0;
+  ExecutionOptions execution;
+  execution.order = Order::kDepthFirst;
+  execution.threads = 2;
+  execution.rays_in_flight = 20000;
+  const auto expected = render(posix_file_system(), scene.value(), picture, execution);
+  ASSERT_TRUE(expected.ok());
+  execution.order = Order::kAuto;
+  for (const bool preview : {false, true}) {
+    execution.preview.path = preview ? (folder_ / "preview.png").string() : "";
+    uint32_t choices = 0;
+    RenderHooks hooks;
+    hooks.chosen = [&](const ChosenOrder&) { ++choices; };
+    const auto result = render(posix_file_system(), scene.value(), picture, execution, hooks);
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_EQ(choices, 1u);
+    EXPECT_NE(result.value().order.order, Order::kAuto);
+    EXPECT_TRUE(result.value().order.reason.starts_with("tried")) << result.value().order.reason;
+    EXPECT_EQ(result.value().rgba, expected.value().rgba);
+    EXPECT_EQ(result.value().counters.total().node_tests_count, expected.value().counters.total().node_tests_count);
+  }
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ TEST(TexturePaging, GivesTheSameBitsWhenTilesDoNotFit) {
   picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(1), {}};
 
   std::vector<float> expected;
-  for (const Order order : {Order::kQueued, Order::kDepthFirst}) {
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted}) {
     for (const bool room : {true, false}) {
       ExecutionOptions execution;
       execution.order = order;
@@ -36,8 +36,10 @@ TEST(TexturePaging, GivesTheSameBitsWhenTilesDoNotFit) {
         EXPECT_LE(counters.texture_loads_count, tiles);
         EXPECT_EQ(counters.page_evictions_count, 0u);
       } else {
-        EXPECT_GT(counters.texture_loads_count, 2 * tiles) << "tiles are read again and again";
-        EXPECT_GT(counters.page_evictions_count, 2 * tiles);
+        // Tiles are read again and again; less often where paths that come by the same places follow each other.
+        const uint64_t many = order == Order::kSorted ? tiles + tiles / 4 : 2 * tiles;
+        EXPECT_GT(counters.texture_loads_count, many);
+        EXPECT_GT(counters.page_evictions_count, many);
         EXPECT_LT(result.value().plan.cache_bytes, result.value().plan.texture_page_bytes / 50);
       }
       if (expected.empty()) expected = result.value().rgba;
