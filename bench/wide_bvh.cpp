@@ -16,18 +16,12 @@ namespace {
 constexpr uint32_t kSerialCount = 8192;  // references below which our nodes are written by one task
 constexpr size_t kArenaBytes = 1u << 20;
 
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 class Stopwatch {
  public:
-  Spent spent() const { return {now_seconds() - start_, cpu_seconds() - cpu_start_}; }
+  Spent spent() const { return {now_seconds() - start_, process_cpu_seconds() - cpu_start_}; }
 
  private:
-  double start_ = now_seconds(), cpu_start_ = cpu_seconds();
+  double start_ = now_seconds(), cpu_start_ = process_cpu_seconds();
 };
 
 // What Embree calls for each node and leaf.

@@ -1,6 +1,7 @@
 // Pages that a thread holds for the rays of its group: one pin serves all rays that stand on a page, and stays until
 // its place is wanted for another, so that a ray that follows finds it without asking the cache, whose counts of pins
-// all threads write to. Called by engine/render_sorted; one a thread.
+// all threads write to. Called by engine/render_sorted, one a thread.
+// render_depth_first shares its limit.
 //
 // Properties and assumptions
 //   capacity   at most `limit` pages are held. Of as many rays each holds one at most, so there is always a place.
@@ -14,6 +15,15 @@
 #include "io/page_cache.h"
 
 namespace shoal {
+
+/// How many rays a thread may have under way, each on a page that it holds: pages of the largest kinds take at most an
+/// eighth of the cache, of all threads together, so that the rest is left to what was used last. From 1 to `most`.
+inline uint32_t rays_under_way(const PageCache& cache, const PageFile& file, unsigned threads, uint32_t most) {
+  constexpr uint64_t kCacheParts = 8;
+  const uint64_t share = cache.capacity_bytes() / (kCacheParts * threads);
+  const uint64_t page = std::max<uint64_t>(PageCache::minimum_capacity_bytes(file, 1), 1);
+  return static_cast<uint32_t>(std::clamp<uint64_t>(share / page, 1, most));
+}
 
 class HeldPages {
  public:

@@ -33,8 +33,8 @@ class RayGroup {
     for (uint32_t i = 0; i < kCapacity; ++i) slot_[i] = static_cast<uint8_t>(i);
   }
 
-  /// Adds a ray; `page` is that of the treelet that its cursor stands on, or none when it has no cursor yet. Returns its
-  /// slot, which is its own until it leaves. Requires: not full().
+  /// Adds a ray; `page` is that of the treelet that its cursor stands on, or none when it has no cursor yet.
+  /// Returns its slot, which is its own until it leaves. Requires: not full().
   uint32_t add(const Ray& ray, const std::byte* page) {
     const uint32_t slot = slot_[size_++];
     GroupRay& member = rays_[slot];
@@ -45,7 +45,6 @@ class RayGroup {
     member.node_tests = member.triangle_tests = 0;
     return slot;
   }
-  const GroupRay& at(uint32_t slot) const { return rays_[slot]; }
 
   /// Every ray goes on by one treelet. `decide(slot, member, treelet)` is told where a ray wants to go (kNoIndex: its
   /// answer is known) and returns the treelet's page to trace it there now, or nothing: the ray has left. Returns the

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <thread>
 
+#include "engine/held_pages.h"
 #include "engine/render_worker.h"
 
 namespace shoal {
@@ -13,16 +14,13 @@ constexpr uint64_t kSamplesPerGrab = 256;
 /// Of the first lattice of a preview: the other threads wait for who has the last ones.
 constexpr uint64_t kFirstSamplesPerGrab = 16;
 constexpr std::chrono::microseconds kFirstLatticeWait{200};
-/// Paths under way in a thread. Fewer where their pages would take more than a part of the cache.
+/// Paths under way in a thread, at most: twice the rays that the kernels take in turn (treelets/trace_treelets.cpp).
 constexpr uint32_t kMaxPaths = 32;
-constexpr uint64_t kCacheParts = 8;
 
 class DepthFirstWorker {
  public:
   explicit DepthFirstWorker(RenderContext& context) : context_(context), worker_(context) {
-    const uint64_t share = context.cache.capacity_bytes() / (kCacheParts * context.threads);
-    const uint64_t page = PageCache::minimum_capacity_bytes(*context.scene.file, 1);
-    path_count_ = static_cast<uint32_t>(std::clamp<uint64_t>(share / std::max<uint64_t>(page, 1), 1, kMaxPaths));
+    path_count_ = rays_under_way(context.cache, *context.scene.file, context.threads, kMaxPaths);
   }
 
   void run() {

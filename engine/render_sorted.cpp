@@ -17,14 +17,13 @@ constexpr uint64_t kRaysPerGrab = 1024;
 /// Rays lie anywhere: asked for so many before their turn.
 constexpr uint64_t kFetchAhead = 16;
 constexpr uint64_t kSamplesPerGrab = 256;
-/// A group of rays holds pages pinned: of the cache no more than this part, of all threads together.
-constexpr uint64_t kCacheParts = 8;
 
 class SortedWorker {
  public:
   SortedWorker(RenderContext& context, SortedPaths& paths, std::atomic<uint64_t>& next_place)
       : context_(context), paths_(paths), next_place_(next_place), worker_(context),
-        group_limit_(group_limit(context)), held_(group_limit_) {}
+        group_limit_(rays_under_way(context.cache, *context.scene.file, context.threads, RayGroup::kCapacity)),
+        held_(group_limit_) {}
 
   /// Begins new samples in the paths [first, last) that are free: their camera rays join the next wave.
   void begin_paths(uint32_t first, uint32_t last) {
@@ -90,18 +89,15 @@ class SortedWorker {
     return true;
   }
 
-  /// Rays under way in a thread.
-  static uint32_t group_limit(const RenderContext& context) {
-    const uint64_t share = context.cache.capacity_bytes() / (kCacheParts * context.threads);
-    const uint64_t page = PageCache::minimum_capacity_bytes(*context.scene.file, 1);
-    return static_cast<uint32_t>(std::clamp<uint64_t>(share / std::max<uint64_t>(page, 1), 1, RayGroup::kCapacity));
-  }
-
   /// The page of the ray's next treelet, held until the ray leaves it; none on an error.
   const std::byte* hold(uint32_t slot, const GroupRay& member, TreeletId treelet) {
     if (const std::byte* page = held_.page(slot, treelet)) return page;
     if (member.traced) ++worker_.ray_counters(member.ray).ray_exits_count;
-    return held_.hold(slot, treelet, [&] { return worker_.pin(treelet); });
+    return held_.hold(slot, treelet, [&] {
+      PagePin pin = worker_.pin(treelet);
+      if (pin) worker_.count_batch(pin);
+      return pin;
+    });
   }
 
   const std::byte* finish(uint32_t slot, const GroupRay& member) {

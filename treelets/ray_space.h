@@ -15,11 +15,11 @@
 // The boxes of nodes are tested with fewer operations (treelets/box_kernel-inl.h): plane * slope + bias, the grid of a
 // quantised node multiplied out. What enters the triangle's own box (box_test.h) must enter every node above it, so the
 // node's ray is wider by the errors of both, as positions. In units of u, of |o| and of B (R = |o| + B): the node 4 and
-// 6 (moved origin, bias, origin * slope and q * (step * slope) where they are not fused, their sums, the grid plane that
-// the packer evaluated in float), its enlargement of t_far 1 and 1, the triangle's box with its own 4 and 3: 9 and 10,
-// hence kNodePad = 12 u more. Slopes are
-// inverse directions, held below 2^60 times the least of them: a box that the ray touches is left after at most
-// 2 R along the longest axis, which a wider one bounds by 12 u R 2^60 along any other.
+// 6 (moved origin, bias, origin * slope and q * (step * slope) where they are not fused, their sums, the grid plane
+// that the packer evaluated in float), its enlargement of t_far 1 and 1, the triangle's box with its own 4 and 3: 9
+// and 10, hence kNodePad = 12 u more.
+// Slopes are inverse directions, held below 2^60 times the least of them: a box that the ray touches is left after at
+// most 2 R along the longest axis, which a wider one bounds by 12 u R 2^60 along any other.
 // Rays whose products could overflow or lose bits are `extreme` and go through box_test.h instead.
 //
 // The tree over instances is tested in world space, the hit was decided in object space. With M the object to world

@@ -15,7 +15,7 @@
 #ifndef SHOAL_TREELETS_TOP_TREE_TABLES
 #define SHOAL_TREELETS_TOP_TREE_TABLES
 namespace shoal {
-/// Rays walked in turn: while one waits for memory or a result the others go on.
+/// Rays walked in turn: while one waits for memory or a result the others go on. As many as the treelet kernel has.
 inline constexpr uint32_t kWalkLanes = 16;
 
 /// What next() needs of a TopTree, for the kernel of each target.
