@@ -8,14 +8,12 @@
 
 #include <filesystem>
 #include <thread>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 
+#include "bench/given_scene.h"
 #include "bench/ray_workloads.h"
 #include "bench/rival_report.h"
-#include "engine/build_scene.h"
-#include "engine/generate.h"
 
 namespace {
 
@@ -28,55 +26,19 @@ constexpr double kMostDisagreeing = 1e-3;
 constexpr uint64_t kLeastRays = 100'000, kMostRays = 4'000'000;
 
 struct Arguments {
-  std::string scene, folder = fs::temp_directory_path().string(), json;
-  uint64_t triangles = 1'000'000, rays = 0;
+  GivenScene scene;
+  std::string folder = fs::temp_directory_path().string(), json;
+  uint64_t rays = 0;
   std::vector<std::string> workloads{std::begin(kWorkloads), std::end(kWorkloads)};
   std::vector<unsigned> threads{1, 2};
   MeasureOptions measure;
   bool not_robust = false, brief = false;
 };
 
-/// For what is built on the way; removed with all it holds.
-class WorkFolder {
- public:
-  explicit WorkFolder(const std::string& parent)
-      : path_(fs::path(parent) / fmt::format("shoal-against-embree-{}", ::getpid())) {}
-  ~WorkFolder() {
-    std::error_code code;
-    fs::remove_all(path_, code);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  void make() const { fs::create_directories(path_); }
-
- private:
-  fs::path path_;
-};
-
-Result<std::string> built(const std::string& gltf, const WorkFolder& folder) {
-  folder.make();
-  const std::string output = folder / "scene.shoal";
-  SHOAL_RETURN_IF_ERROR(build_scene(posix_file_system(), gltf, output, {}));
-  return output;
-}
-
-/// The .shoal to trace: as it was given, or made in `folder`.
-Result<std::string> scene_file(const Arguments& arguments, const WorkFolder& folder) {
-  if (arguments.scene.ends_with(".gltf") || arguments.scene.ends_with(".glb")) return built(arguments.scene, folder);
-  if (!arguments.scene.empty()) return arguments.scene;
-  GenerateOptions options;
-  options.kind = "terrain";
-  options.triangles = arguments.triangles;
-  options.out_dir = folder / "source";
-  SHOAL_ASSIGN_OR_RETURN(const GenerateReport generated, generate_scene(posix_file_system(), options));
-  return built(generated.gltf_path, folder);
-}
-
 RivalScene describe(const Arguments& arguments, const MemoryScene& memory, const WorldMesh& mesh,
                     const EmbreeScene& usual, const EmbreeScene& compact) {
   RivalScene scene;
-  scene.name = arguments.scene.empty() ? "terrain" : fs::path(arguments.scene).stem().string();
+  scene.name = arguments.scene.name();
   scene.triangles = mesh.triangle_count();
   scene.treelets = memory.pages.size();
   scene.shoal_bytes = memory.geometry_bytes + memory.top_tree().resident_bytes();
@@ -100,8 +62,8 @@ Status check_row(const RivalRow& row) {
 }
 
 Status run(const Arguments& arguments) {
-  const WorkFolder folder(arguments.folder);
-  SHOAL_ASSIGN_OR_RETURN(const std::string path, scene_file(arguments, folder));
+  const WorkFolder folder(arguments.folder, "against-embree");
+  SHOAL_ASSIGN_OR_RETURN(const std::string path, scene_file(arguments.scene, folder));
   SHOAL_ASSIGN_OR_RETURN(const MemoryScene memory, load_into_memory(path));
   SHOAL_ASSIGN_OR_RETURN(const WorldMesh mesh, take_mesh(memory));
   EmbreeOptions options;
@@ -140,8 +102,8 @@ Status run(const Arguments& arguments) {
 void add_options(CLI::App& app, Arguments& arguments) {
   const CLI::AsNumberWithUnit thousands(
       std::map<std::string, uint64_t>{{"K", 1000}, {"M", 1000000}, {"G", 1000000000}});
-  auto* scene = app.add_option("--scene", arguments.scene, "a .shoal, or a .gltf that is built first");
-  app.add_option("--triangles", arguments.triangles, "of the generated terrain, such as 40M")
+  auto* scene = app.add_option("--scene", arguments.scene.path, "a .shoal, or a .gltf that is built first");
+  app.add_option("--triangles", arguments.scene.triangles, "of the generated terrain, such as 40M")
       ->transform(thousands)
       ->excludes(scene)
       ->capture_default_str();
@@ -179,7 +141,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Rays a second against a scene in memory, beside Embree", "against_embree"};
   add_options(app, arguments);
   CLI11_PARSE(app, argc, argv);
-  if (arguments.brief) arguments.triangles = 50'000, arguments.rays = 20'000, arguments.measure.repeats = 1;
+  if (arguments.brief) arguments.scene.triangles = 50'000, arguments.rays = 20'000, arguments.measure.repeats = 1;
   const Status status = run(arguments);
   if (status.ok()) return 0;
   fmt::print(stderr, "against_embree: {}\n", status.error().message);
