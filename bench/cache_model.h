@@ -1,16 +1,17 @@
-// A model of the processor's data caches: set-associative, the least recently touched line of a set leaves it, written
-// lines are fetched first (write-allocate) and go back to memory when they leave (write-back). It is told every
+// A model of the processor's data caches: set-associative, the least recently touched line of a set leaves it, what is
+// written is fetched first (write-allocate) and goes back to memory when it leaves (write-back). It is told every
 // address that a program touches and counts the lines that move between memory and the outer cache, by kind of data.
 // Called by bench/cache_traffic; knows nothing of rays.
 //
-// What it leaves out: hardware prefetchers, physical addresses (sets are chosen by the addresses it is told), what other
-// programs and the program's code take of the cache, stores that go past it.
+// What it leaves out: hardware prefetchers, physical addresses (sets are chosen by the addresses it is told), what
+// other programs and the program's code take of the cache, stores that go past it.
 //
-// An inner cache in front is optional. Then the outer one sees only what misses the inner one, and dirty lines that the
-// inner one lets go: those are whole, so nothing is fetched for them. Neither includes nor excludes what the other has.
+// An inner cache in front is optional. Then the outer one sees only what misses the inner one, and dirty lines that
+// the inner one lets go: those are whole, so nothing is fetched for them. Neither includes nor excludes what the other
+// has.
 //
-// Sampling: with `sample` N only one in N sets is modelled, the counts of the others taken to be the same. The sets are
-// spread, so that arrays with a regular step are not caught at one place of the step.
+// Sampling: with `sample` N only one in N sets is modelled, the counts of the others taken to be the same. The sets
+// are spread, so that arrays with a regular step are not caught at one place of the step.
 //
 // Threads: one. Cost: some 5 ns a line for the newest lines of a set, 20 for its oldest; 8 bytes a line of the cache.
 #pragma once
@@ -48,8 +49,8 @@ class CacheLevel {
   explicit CacheLevel(const CacheShape& shape);
 
   /// Makes the line the newest of its set, bringing it in where it is missing; returns whether it was there. A line
-  /// has the kind of whoever brought it or wrote it last. `evicted` is set when a line was brought in; what left may be
-  /// nothing (not dirty).
+  /// has the kind of whoever brought it or wrote it last. `evicted` is set when a line was brought in; what left may
+  /// be nothing (not dirty).
   bool touch(uint64_t line, bool write, uint8_t kind, Evicted& evicted);
   /// Lets all lines go; `let_go` is told the dirty ones.
   template <class LetGo>

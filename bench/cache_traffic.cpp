@@ -133,8 +133,8 @@ Status run(const Arguments& arguments) {
   for (const MemoryOrder order : arguments.orders) {
     SHOAL_ASSIGN_OR_RETURN(const OrderTraffic found, traffic_of(order, scene, options, set, traffic));
     orders.push_back(found);
+    print_newest(traffic, orders);
   }
-  print_orders(traffic, orders);
   if (arguments.json.empty()) return {};
   const std::string text = to_json(traffic, orders).dump(1) + "\n";
   return write_whole_file(posix_file_system(), arguments.json, std::as_bytes(std::span(text)));

@@ -16,8 +16,8 @@ enum class DataKind : uint8_t {
   kSorting,  ///< keys and permutations
   kInHand,   ///< of the rays being traced: themselves, their contexts and stacks
 };
-inline constexpr const char* kDataKinds[] = {"top tree", "treelet nodes", "leaves",  "rays",
-                                             "answers",  "queues",        "sorting", "in hand"};
+inline constexpr const char* kDataKinds[] = {"top tree", "nodes",  "leaves",  "rays",
+                                             "answers",  "queues", "sorting", "in hand"};
 inline constexpr uint8_t kDataKindCount = std::size(kDataKinds);
 static_assert(kDataKindCount == static_cast<uint8_t>(DataKind::kInHand) + 1);
 

@@ -19,7 +19,9 @@ class SortKey {
     for (int axis = 0; axis < 3; ++axis) {
       const float cell = (ray.origin[axis] - lo_[axis]) * scale_[axis];
       const uint64_t bits = cell > 0 ? static_cast<uint64_t>(std::min(cell, float{(1u << kAxisBits) - 1})) : 0;
-      for (uint32_t bit = 0; bit < kAxisBits; ++bit) morton |= (bits >> bit & 1) << (3 * bit + static_cast<uint32_t>(axis));
+      for (uint32_t bit = 0; bit < kAxisBits; ++bit) {
+        morton |= (bits >> bit & 1) << (3 * bit + static_cast<uint32_t>(axis));
+      }
       octant |= (ray.direction[axis] < 0 ? 1ull : 0ull) << axis;
     }
     return morton << 3 | octant;

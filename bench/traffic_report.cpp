@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace shoal::bench {
@@ -33,31 +34,27 @@ void print_run(const TrafficRun& run) {
   if (run.cache.inner.has_value()) fmt::print(", behind an L1 of {}", describe(*run.cache.inner));
   if (run.cache.sample > 1) fmt::print("; one in {} sets is modelled", run.cache.sample);
   fmt::print("; {} the kernels' prefetches\n\n", run.prefetches ? "with" : "without");
+  fmt::print("{:<11} {:>21} {:>10} {:>7} {:>6} | {:<75} | {:^31} |\n", "", "lines", "MB", "bytes/", "over",
+             "bytes a ray, fills and write-backs", "a ray");
+  fmt::print("{:<11} {:>10} {:>10} {:>10} {:>7} {:>6} |", "order", "fills", "back", "moved", "ray", "first");
+  for (const char* kind : kDataKinds) fmt::print(" {:>8}", kind);
+  fmt::print("    | {:>7} {:>9} {:>9}    | {:>7}\n", "nodes", "triangles", "treelets", "drains");
   std::fflush(stdout);
 }
 
-void print_orders(const TrafficRun& run, const std::vector<OrderTraffic>& orders) {
-  const uint64_t line_bytes = run.cache.outer.line_bytes;
-  fmt::print("{:<12} {:>12} {:>12} {:>10} {:>8} {:>6} |", "order", "fills", "write-backs", "MB", "bytes/", "of");
-  for (const char* kind : kDataKinds) fmt::print(" {:>13}", kind);
-  fmt::print("\n{:<12} {:>12} {:>12} {:>10} {:>8} {:>6} | bytes a ray of each kind, fills and write-backs\n", "",
-             "lines", "lines", "moved", "ray", name_of(orders.front().order) + std::string(" "));
-  for (const OrderTraffic& order : orders) {
-    const uint64_t bytes = order.lines.total() * line_bytes;
-    fmt::print("{:<12} {:>12} {:>12} {:>10.1f} {:>8.1f} {:>6.3f} |", name_of(order.order), order.lines.fills,
-               order.lines.write_backs, static_cast<double>(bytes) / 1e6, per(bytes, run.rays),
-               per(order.lines.total(), orders.front().lines.total()));
-    for (const LineCounts& lines : order.lines_of_kind) {
-      fmt::print(" {:>13.1f}", per(lines.total() * line_bytes, run.rays));
-    }
-    fmt::print("\n");
+void print_newest(const TrafficRun& run, const std::vector<OrderTraffic>& orders) {
+  const OrderTraffic& order = orders.back();
+  const uint64_t bytes = order.lines.total() * run.cache.outer.line_bytes;
+  fmt::print("{:<11} {:>10} {:>10} {:>10.1f} {:>7.1f} {:>6.3f} |", name_of(order.order), order.lines.fills,
+             order.lines.write_backs, static_cast<double>(bytes) / 1e6, per(bytes, run.rays),
+             per(order.lines.total(), orders.front().lines.total()));
+  for (const LineCounts& lines : order.lines_of_kind) {
+    fmt::print(" {:>8.1f}", per(lines.total() * run.cache.outer.line_bytes, run.rays));
   }
-  for (const OrderTraffic& order : orders) {
-    fmt::print("{}{}: {:.2f} node tests, {:.2f} triangle tests, {:.2f} treelets a ray, {} drains\n",
-               &order == orders.data() ? "\n" : "", name_of(order.order), per(order.counts.node_tests, run.rays),
-               per(order.counts.triangle_tests, run.rays), per(order.counts.treelet_visits, run.rays),
-               order.counts.drains);
-  }
+  fmt::print("    | {:>7.2f} {:>9.2f} {:>9.3f}    | {:>7}\n", per(order.counts.node_tests, run.rays),
+             per(order.counts.triangle_tests, run.rays), per(order.counts.treelet_visits, run.rays),
+             order.counts.drains);
+  std::fflush(stdout);
 }
 
 nlohmann::ordered_json to_json(const TrafficRun& run, const std::vector<OrderTraffic>& orders) {

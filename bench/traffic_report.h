@@ -25,8 +25,8 @@ struct OrderTraffic {
 };
 
 void print_run(const TrafficRun& run);
-/// A table; the first of `orders` is what the others are compared with.
-void print_orders(const TrafficRun& run, const std::vector<OrderTraffic>& orders);
+/// The last of `orders` as a line of the table; the first is what it is compared with.
+void print_newest(const TrafficRun& run, const std::vector<OrderTraffic>& orders);
 nlohmann::ordered_json to_json(const TrafficRun& run, const std::vector<OrderTraffic>& orders);
 
 }  // namespace shoal::bench
