@@ -1,10 +1,12 @@
 // shoal compare: the same picture in several orders, and what each of them moved.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "bins/choice_option.h"
 #include "bins/command.h"
@@ -18,27 +20,59 @@ struct Arguments {
   RenderArguments render;
   std::vector<std::string> orders{"queued", "depth-first"};
   std::string out;
+  uint32_t runs = 1;
 };
 
 struct OrderResult {
   ExecutionOptions execution;
-  RenderResult result;
+  std::vector<RenderResult> runs;  ///< without pictures
+
+  /// The run that took the median time; of an even number, the faster of the two in the middle.
+  const RenderResult& median() const {
+    std::vector<const RenderResult*> by_time;
+    for (const RenderResult& run : runs) by_time.push_back(&run);
+    const auto middle = by_time.begin() + static_cast<ptrdiff_t>((by_time.size() - 1) / 2);
+    std::nth_element(by_time.begin(), middle, by_time.end(),
+                     [](const RenderResult* a, const RenderResult* b) { return a->seconds < b->seconds; });
+    return **middle;
+  }
 };
 
-Result<std::vector<OrderResult>> render_orders(const Arguments& arguments, PreparedRender& prepared,
-                                               Console& console) {
-  std::vector<OrderResult> results;
+struct Comparison {
+  std::vector<OrderResult> orders;
+  bool identical = true;  ///< every picture has the bits of the first
+};
+
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
+
+/// The orders take turns, so that what else the machine does disturbs all alike. Of the pictures only the first is kept.
+Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& prepared, Console& console) {
+  Comparison comparison;
+  std::vector<float> first;
   for (const std::string& name : arguments.orders) {
-    ExecutionOptions execution = prepared.execution;
-    SHOAL_ASSIGN_OR_RETURN(execution.order, parse_order(name));
-    RenderHooks hooks = console_hooks(console);
-    hooks.planned = [&](const MemoryPlan& plan) { console.info(name + ": " + describe_plan(plan)); };
-    auto result = render(posix_file_system(), prepared.scene, prepared.picture, execution, hooks);
-    console.end_progress();
-    if (!result.ok()) return std::move(result).error();
-    results.push_back({execution, std::move(result).value()});
+    comparison.orders.push_back({prepared.execution, {}});
+    SHOAL_ASSIGN_OR_RETURN(comparison.orders.back().execution.order, parse_order(name));
   }
-  return results;
+  for (uint32_t run = 0; run < arguments.runs; ++run) {
+    for (OrderResult& order : comparison.orders) {
+      const std::string name(order_name(order.execution.order));
+      RenderHooks hooks = console_hooks(console);
+      hooks.planned = [&](const MemoryPlan& plan) { console.info(name + ": " + describe_plan(plan)); };
+      auto result = render(posix_file_system(), prepared.scene, prepared.picture, order.execution, hooks);
+      console.end_progress();
+      if (!result.ok()) return std::move(result).error();
+      std::vector<float> picture = std::exchange(result.value().rgba, {});
+      if (first.empty()) {
+        first = std::move(picture);
+      } else {
+        comparison.identical = comparison.identical && same_bits(picture, first);
+      }
+      order.runs.push_back(std::move(result).value());
+    }
+  }
+  return comparison;
 }
 
 /// What can be said before the scene is read; makes the folder.
@@ -50,18 +84,16 @@ Status check_arguments(const Arguments& arguments) {
   return check_output(arguments.out + "/compare.json");
 }
 
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
-}
-
-Status write_report(const Arguments& arguments, const PreparedRender& prepared,
-                    const std::vector<OrderResult>& results, bool identical) {
+Status write_report(const Arguments& arguments, const PreparedRender& prepared, const Comparison& comparison) {
   nlohmann::ordered_json json;
   json["schema_version"] = 1;
-  json["pictures_identical"] = identical;
-  for (const OrderResult& r : results) {
-    json["orders"][std::string(order_name(r.execution.order))] =
-        nlohmann::ordered_json::parse(stats_json(r.result, prepared.scene, prepared.picture, r.execution));
+  json["pictures_identical"] = comparison.identical;
+  json["runs_count"] = arguments.runs;
+  for (const OrderResult& order : comparison.orders) {
+    auto& stats = json["orders"][std::string(order_name(order.execution.order))];
+    stats = nlohmann::ordered_json::parse(
+        stats_json(order.median(), prepared.scene, prepared.picture, order.execution));
+    for (const RenderResult& run : order.runs) stats["run_seconds"].push_back(run.seconds);
   }
   const std::string text = json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   return write_whole_file(posix_file_system(), arguments.out + "/compare.json", std::as_bytes(std::span(text)));
@@ -71,21 +103,20 @@ int run_compare(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   std::vector<Order> orders;
   for (const std::string& name : arguments.orders) orders.push_back(parse_order(name).value());
-  auto prepared = prepare_render(arguments.render, orders, console);
+  auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1, console);
   if (!prepared.ok()) return console.error(prepared.error());
-  auto results = render_orders(arguments, prepared.value(), console);
-  if (!results.ok()) return console.error(results.error());
-  bool identical = true;
+  const auto compared = render_orders(arguments, prepared.value(), console);
+  if (!compared.ok()) return console.error(compared.error());
+  const Comparison& comparison = compared.value();
   std::vector<TrafficColumn> columns;
-  for (const OrderResult& r : results.value()) {
-    identical = identical && same_bits(r.result.rgba, results.value().front().result.rgba);
-    columns.push_back({std::string(order_name(r.execution.order)), &r.result});
+  for (const OrderResult& order : comparison.orders) {
+    columns.push_back({std::string(order_name(order.execution.order)), &order.median()});
   }
-  const Status written = write_report(arguments, prepared.value(), results.value(), identical);
+  const Status written = write_report(arguments, prepared.value(), comparison);
   if (!written.ok()) return console.error(written.error());
   fmt::print("{}", traffic_table(columns));
-  fmt::print("{:<34}{:>16}\n", "pictures", identical ? "identical" : "DIFFERENT");
-  if (identical) return 0;
+  fmt::print("{:<34}{:>16}\n", "pictures", comparison.identical ? "identical" : "DIFFERENT");
+  if (comparison.identical) return 0;
   return console.error({ErrorCode::kInternal, "the orders gave different pictures: this is a bug"});
 }
 
@@ -99,6 +130,9 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
       ->delimiter(',')
       ->capture_default_str();
   sub->add_option("--out", arguments->out, "folder for compare.json")->required();
+  sub->add_option("--runs", arguments->runs, "of each order, in turns; the one of median time is shown")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_compare(*arguments, console); };
   });

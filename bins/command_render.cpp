@@ -61,7 +61,7 @@ int run_render(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   RenderArguments asked = arguments.render;
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
-  auto prepared = prepare_render(asked, {arguments.render.execution.order}, console);
+  auto prepared = prepare_render(asked, {arguments.render.execution.order}, false, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
   RenderHooks hooks = console_hooks(console);

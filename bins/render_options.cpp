@@ -75,15 +75,15 @@ Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& c
   return {};
 }
 
-/// Refuses a cap that cannot work before tables are read. Of several orders each must fit beside the pictures before it.
-Status fit_cap(const PageFile& file, const std::vector<Order>& orders, PreparedRender& prepared) {
+/// Refuses a cap that cannot work before tables are read. Each order must fit, beside a picture that is kept.
+Status fit_cap(const PageFile& file, const std::vector<Order>& orders, bool picture_kept, PreparedRender& prepared) {
   const uint64_t picture_bytes = uint64_t{prepared.picture.width} * prepared.picture.height * 4 * sizeof(float);
   MemoryPlan plan;
   for (const Order order : orders) {
     ExecutionOptions execution = prepared.execution;
     execution.order = order;
     SHOAL_ASSIGN_OR_RETURN(plan, plan_before_tables(posix_file_system(), file, prepared.picture, execution,
-                                                    (orders.size() - 1) * picture_bytes));
+                                                    picture_kept ? picture_bytes : 0));
   }
   prepared.execution.process_bytes = plan.process_bytes;
   return {};
@@ -239,7 +239,7 @@ void RenderArguments::declare(CLI::App& app) {
 }
 
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
-                                      Console& console) {
+                                      bool picture_kept, Console& console) {
   PreparedRender prepared;
   prepared.picture = arguments.picture;
   prepared.execution = arguments.execution;
@@ -259,7 +259,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
   SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
-  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, prepared));
+  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, picture_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));

@@ -54,9 +54,9 @@ struct PreparedRender {
   ExecutionOptions execution;
 };
 /// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment. The cap must
-/// fit every one of `orders`, whose pictures are kept.
+/// fit every one of `orders`, beside a picture of the same size where `picture_kept`.
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
-                                      Console& console);
+                                      bool picture_kept, Console& console);
 
 /// Becomes true at SIGINT or SIGTERM, from this call on.
 const std::atomic<bool>* stop_on_signals();

@@ -16,9 +16,11 @@
 
 namespace shoal {
 
-/// How many rays a thread may have under way, each on a page that it holds: pages of the largest kinds take at most an
-/// eighth of the cache, of all threads together, so that the rest is left to what was used last. From 1 to `most`.
+/// How many rays a thread may have under way, each on a page that it holds. Where the cache has room for every page, as
+/// many as it likes: `most`. Else pages of the largest kinds take at most an eighth of the cache, of all threads together,
+/// so that the rest is left to what was used last. From 1 to `most`.
 inline uint32_t rays_under_way(const PageCache& cache, const PageFile& file, unsigned threads, uint32_t most) {
+  if (cache.capacity_bytes() >= PageCache::every_page_bytes(file)) return most;
   constexpr uint64_t kCacheParts = 8;
   const uint64_t share = cache.capacity_bytes() / (kCacheParts * threads);
   const uint64_t page = std::max<uint64_t>(PageCache::minimum_capacity_bytes(file, 1), 1);

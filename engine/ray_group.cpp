@@ -2,7 +2,6 @@
 
 namespace shoal {
 
-/// Finds the next entry of every ray that stands on none.
 void RayGroup::address(const TopTree& tree) {
   NextJob jobs[kCapacity];
   uint8_t slots[kCapacity];
@@ -22,8 +21,7 @@ void RayGroup::address(const TopTree& tree) {
   }
 }
 
-/// Traces every ray through the treelet that it stands on.
-void RayGroup::trace(const TopTree& tree, TraceCounters& counters) {
+uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters) {
   TraceJob jobs[kCapacity];
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];
@@ -38,6 +36,7 @@ void RayGroup::trace(const TopTree& tree, TraceCounters& counters) {
     member.page = nullptr;
     member.traced = true;
   }
+  return size_;
 }
 
 }  // namespace shoal

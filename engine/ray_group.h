@@ -46,12 +46,23 @@ class RayGroup {
     return slot;
   }
 
-  /// Every ray goes on by one treelet. `decide(slot, member, treelet)` is told where a ray wants to go (kNoIndex: its
-  /// answer is known) and returns the treelet's page to trace it there now, or nothing: the ray has left. Returns the
-  /// number of rays traced.
+  /// A ray of the group; one that left, until the next is added.
+  const GroupRay& ray(uint32_t slot) const { return rays_[slot]; }
+
+  /// Every ray goes on by one treelet: address, send, trace. Returns the number of rays traced.
   template <class Decide>
   uint32_t step(const TopTree& tree, TraceCounters& counters, const Decide& decide) {
     address(tree);
+    send(tree, decide);
+    return trace(tree, counters);
+  }
+
+  /// Finds the next entry of every ray that stands on none.
+  void address(const TopTree& tree);
+  /// `decide(slot, member, treelet)` is told where a ray that was addressed wants to go (kNoIndex: its answer is known)
+  /// and returns the treelet's page to trace it there now, or nothing: the ray has left.
+  template <class Decide>
+  void send(const TopTree& tree, const Decide& decide) {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < size_; ++i) {
       const uint8_t slot = slot_[i];
@@ -64,14 +75,11 @@ class RayGroup {
       std::swap(slot_[i], slot_[kept++]);
     }
     size_ = kept;
-    trace(tree, counters);
-    return kept;
   }
+  /// Traces every ray through the treelet that it stands on. Returns their number.
+  uint32_t trace(const TopTree& tree, TraceCounters& counters);
 
  private:
-  void address(const TopTree& tree);
-  void trace(const TopTree& tree, TraceCounters& counters);
-
   uint32_t size_;
   uint8_t slot_[kCapacity];  ///< first those of the rays, then the free ones
   uint32_t entry_[kCapacity];

@@ -57,8 +57,16 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
       static_cast<double>(context.samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
   result.peak_cache_bytes = context.cache.peak_resident_bytes();
   result.read_backend = context.cache.read_backend();
-  result.seconds = now_seconds() - context.start_seconds;
   return result;
+}
+
+/// Ends the clocks of a render that began at `start_ticks`: both clocks saw the same time.
+void take_times(RenderContext& context, uint64_t start_ticks, RenderResult& result) {
+  const uint64_t ticks = now_ticks();
+  result.seconds = now_seconds() - context.start_seconds;
+  for (PhaseClock& clock : context.phases) clock.settle(ticks);
+  const uint64_t elapsed = std::max<uint64_t>(ticks - start_ticks, 1);
+  result.phases = phase_times(context.phases, result.seconds / static_cast<double>(elapsed));
 }
 
 }  // namespace
@@ -91,6 +99,7 @@ Status check_picture(const PictureOptions& picture) {
 Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
                             const ExecutionOptions& asked, const RenderHooks& hooks) {
   const double start = now_seconds();
+  const uint64_t start_ticks = now_ticks();
   SHOAL_RETURN_IF_ERROR(check_options(scene, picture, asked));
   ExecutionOptions execution = asked;
   if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
@@ -116,6 +125,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
   RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
   context.start_seconds = start;
+  context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;
   const ChosenOrder chosen = orders.run(context);
   cache.finish_loads();
@@ -124,6 +134,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
   RenderResult result = finish_result(context, plan, preview);
   result.order = chosen;
+  take_times(context, start_ticks, result);
   return result;
 }
 

@@ -13,6 +13,7 @@
 
 #include "engine/counters.h"
 #include "engine/memory_plan.h"
+#include "engine/phase_clock.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
 #include "engine/tonemap.h"
@@ -89,6 +90,7 @@ struct RenderResult {
   ChosenOrder order;
   double seconds = 0;
   unsigned threads = 0;
+  PhaseTimes phases;  ///< of all threads: sums to threads * seconds
   uint64_t peak_cache_bytes = 0;
   std::string read_backend;  ///< PageCache::read_backend()
   double picture_share = 1;  ///< share of the pixels that were rendered (PictureOptions::tile_sample)

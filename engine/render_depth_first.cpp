@@ -19,7 +19,7 @@ constexpr uint32_t kMaxPaths = 32;
 
 class DepthFirstWorker {
  public:
-  explicit DepthFirstWorker(RenderContext& context) : context_(context), worker_(context) {
+  DepthFirstWorker(RenderContext& context, unsigned thread) : context_(context), worker_(context, thread) {
     path_count_ = rays_under_way(context.cache, *context.scene.file, context.threads, kMaxPaths);
   }
 
@@ -31,7 +31,9 @@ class DepthFirstWorker {
       run_paths(samples);
       context_.samples_done += samples.size();
       worker_.report_progress();
-      if (samples.size() == 0) std::this_thread::sleep_for(kFirstLatticeWait);
+      if (samples.size() > 0) continue;
+      worker_.enter(Phase::kIdle);
+      std::this_thread::sleep_for(kFirstLatticeWait);
     }
     worker_.hand_in();
   }
@@ -50,15 +52,13 @@ class DepthFirstWorker {
     for (uint32_t i = 0; i < path_count_ && next < samples.last; ++i) begin(i, next++);
     const auto decide = [&](uint32_t slot, const GroupRay& member, TreeletId treelet) -> const std::byte* {
       if (treelet != kNoIndex) return pin(slot, member, treelet);
-      worker_.count_leaving(member, kNoIndex);
-      Path& path = paths_[path_index_of(member.ray)];
       pins_[slot].reset();
-      worker_.finish_ray(member.ray, path.state);
-      ready_[ready_count_++] = path_index_of(member.ray);
+      home_[home_count_++] = slot;
       return nullptr;
     };
     while (group_.size() > 0 && !context_.ended.load(std::memory_order_relaxed)) {
-      worker_.step(group_, decide);
+      worker_.step(group_, Phase::kPaging, decide);
+      finish_rays();
       while (ready_count_ > 0) {
         const uint32_t index = ready_[--ready_count_];
         if (!go_on(index) && next < samples.last) begin(index, next++);
@@ -71,6 +71,19 @@ class DepthFirstWorker {
     Path& path = paths_[index];
     path.ray_count = 0;
     group_.add(worker_.begin_path(sample, index, path.state), nullptr);
+  }
+
+  /// Notes the answers of the rays that came home.
+  void finish_rays() {
+    worker_.enter(Phase::kPaths);
+    for (uint32_t i = 0; i < home_count_; ++i) {
+      const GroupRay& member = group_.ray(home_[i]);
+      worker_.count_leaving(member, kNoIndex);
+      const uint32_t index = path_index_of(member.ray);
+      worker_.finish_ray(member.ray, paths_[index].state);
+      ready_[ready_count_++] = index;
+    }
+    home_count_ = 0;
   }
 
   /// A ray of the path has come home: sends the next one out, shading first where none is left. False: the path is over.
@@ -128,14 +141,16 @@ class DepthFirstWorker {
   PagePin pins_[RayGroup::kCapacity];  ///< by slot of the group
   TreeletId treelets_[RayGroup::kCapacity] = {};
   Path paths_[kMaxPaths];
-  uint32_t ready_[kMaxPaths];  ///< paths whose ray has come home in this step
+  uint32_t home_[kMaxPaths];   ///< slots of the rays that came home in this step
+  uint32_t home_count_ = 0;
+  uint32_t ready_[kMaxPaths];  ///< their paths
   uint32_t ready_count_ = 0;
 };
 
 }  // namespace
 
 void render_depth_first(RenderContext& context) {
-  run_on_threads(context, [&](unsigned) { std::make_unique<DepthFirstWorker>(context)->run(); });
+  run_on_threads(context, [&](unsigned thread) { std::make_unique<DepthFirstWorker>(context, thread)->run(); });
 }
 
 }  // namespace shoal

@@ -18,12 +18,13 @@ constexpr std::chrono::microseconds kLoadWait{1000};
 
 class QueuedWorker {
  public:
-  QueuedWorker(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches)
+  QueuedWorker(RenderContext& context, unsigned thread, QueuedPaths& paths, TreeletScheduler& scheduler,
+               UsualBatches& batches)
       : context_(context),
         paths_(paths),
         scheduler_(scheduler),
         batches_(batches),
-        worker_(context),
+        worker_(context, thread),
         admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)) {}
 
   void run() {
@@ -32,14 +33,17 @@ class QueuedWorker {
         admit(admit_batch_);
         worker_.report_progress();  // paths that see nothing end at once, and leave room for more
       }
+      worker_.enter(Phase::kScheduling);
       const TreeletId treelet = scheduler_.choose(room_for(admit_batch_), worker_.cache_counters());
       if (treelet != kNoIndex) {
         drain(treelet);
       } else if (room_for(1)) {
         admit(admit_batch_);
       } else if (context_.cache.loading_count() > 0) {
+        worker_.enter(Phase::kPaging);
         context_.cache.wait_for_load(kLoadWait);
       } else {
+        worker_.enter(Phase::kIdle);
         std::this_thread::yield();  // other threads have the last rays in hand
       }
       worker_.report_progress();
@@ -56,6 +60,7 @@ class QueuedWorker {
 
   /// Begins up to `wanted` new paths: addresses their camera rays and queues them.
   void admit(uint32_t wanted) {
+    worker_.enter(Phase::kPaths);
     uint32_t path = kNoIndex;
     const uint32_t taken = paths_.take_free(wanted, &path);
     const SampleRange samples = context_.begin_samples(taken);
@@ -75,6 +80,7 @@ class QueuedWorker {
   }
 
   void drain(TreeletId treelet) {
+    worker_.enter(Phase::kQueue);
     batches_.note(treelet, paths_.waiting(treelet));
     uint32_t path = paths_.to_shade.take(treelet);
     RayBatch batch = paths_.rays.take(treelet);
@@ -88,6 +94,7 @@ class QueuedWorker {
         vertex_ready(current);
         return true;
       }
+      worker_.enter(Phase::kQueue);
       if (next == count) {
         next = 0, count = batch.next_block(block_);
         if (count == 0) return false;
@@ -109,36 +116,54 @@ class QueuedWorker {
   /// ones aside; it returns false when it has none left.
   template <class More>
   void travel(const More& more) {
-    const auto decide = [this](uint32_t, GroupRay& member, TreeletId treelet) { return route(member, treelet); };
+    const auto decide = [this](uint32_t slot, const GroupRay& member, TreeletId treelet) {
+      return route(slot, member, treelet);
+    };
     bool left = true;
     while (!context_.ended.load(std::memory_order_relaxed)) {
       while (!group_.full() && !context_.ended.load(std::memory_order_relaxed)) {
         if (fresh_count_ > 0) {
+          worker_.enter(Phase::kPaths);
           group_.add(fresh_[--fresh_count_], nullptr);
         } else if (!left || !(left = more())) {
           break;
         }
       }
       if (group_.size() == 0) break;
-      worker_.step(group_, decide);
+      worker_.step(group_, Phase::kQueue, decide);
+      finish_rays();
     }
     group_.clear(), fresh_count_ = 0;
   }
 
-  /// Sends a ray on to `treelet`: through the treelet in hand at once, into a queue, or its answer is noted.
-  const std::byte* route(const GroupRay& member, TreeletId treelet) {
-    if (treelet != kNoIndex && treelet == worker_.in_hand()) return worker_.page_in_hand();
-    const Ray& ray = member.ray;
-    worker_.count_leaving(member, treelet);
-    if (treelet != kNoIndex) {
-      ++worker_.ray_counters(ray).rays_queued_count;
-      worker_.counters().ray_moved_bytes += sizeof(Ray);
-      paths_.rays.push(treelet, ray);
+  /// Sends a ray on to `treelet`: through the treelet in hand at once, into a queue, or home.
+  const std::byte* route(uint32_t slot, const GroupRay& member, TreeletId treelet) {
+    if (treelet == kNoIndex) {
+      home_[home_count_++] = slot;
       return nullptr;
     }
-    const uint32_t path = path_index_of(ray);
-    if (worker_.finish_ray(ray, paths_.state(path))) vertex_ready(path);
+    if (treelet == worker_.in_hand()) return worker_.page_in_hand();
+    const Ray& ray = member.ray;
+    worker_.count_leaving(member, treelet);
+    ++worker_.ray_counters(ray).rays_queued_count;
+    worker_.counters().ray_moved_bytes += sizeof(Ray);
+    paths_.rays.push(treelet, ray);
     return nullptr;
+  }
+
+  /// Notes the answers of the rays that came home, then handles the vertices that have no other ray out.
+  void finish_rays() {
+    worker_.enter(Phase::kPaths);
+    uint32_t ready[RayGroup::kCapacity];
+    uint32_t ready_count = 0;
+    for (uint32_t i = 0; i < home_count_; ++i) {
+      const GroupRay& member = group_.ray(home_[i]);
+      worker_.count_leaving(member, kNoIndex);
+      const uint32_t path = path_index_of(member.ray);
+      if (worker_.finish_ray(member.ray, paths_.state(path))) ready[ready_count++] = path;
+    }
+    home_count_ = 0;
+    for (uint32_t i = 0; i < ready_count; ++i) vertex_ready(ready[i]);
   }
 
   /// Both rays of the vertex are home: the path ends, is shaded here, or waits for its treelet.
@@ -150,6 +175,7 @@ class QueuedWorker {
       return end(path_index);
     }
     if (path.hit.treelet != worker_.in_hand() || !worker_.attributes_at_hand()) {
+      worker_.enter(Phase::kQueue);
       ++worker_.counters().paths_shaded_waiting_count;
       paths_.to_shade.push(path.hit.treelet, path_index);
       return;
@@ -173,6 +199,8 @@ class QueuedWorker {
   RenderWorker worker_;
   uint32_t admit_batch_;
   RayGroup group_;
+  uint32_t home_[RayGroup::kCapacity];  ///< slots of the rays that came home in this step
+  uint32_t home_count_ = 0;
   /// Waiting to join the group. While there are any, nothing else joins it: so they belong to the at most 64 paths that
   /// had a ray in the group, each of which has at most two.
   Ray fresh_[2 * RayGroup::kCapacity];
@@ -183,7 +211,9 @@ class QueuedWorker {
 }  // namespace
 
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches) {
-  run_on_threads(context, [&](unsigned) { std::make_unique<QueuedWorker>(context, paths, scheduler, batches)->run(); });
+  run_on_threads(context, [&](unsigned thread) {
+    std::make_unique<QueuedWorker>(context, thread, paths, scheduler, batches)->run();
+  });
 }
 
 }  // namespace shoal

@@ -86,6 +86,21 @@ Json plan_json(const MemoryPlan& plan) {
           {"texture_page_bytes", plan.texture_page_bytes}};
 }
 
+Json phases_json(const PhaseTimes& phases) {
+  Json seconds, shares, meanings;
+#define SHOAL_ADD(phase, name, sentence)         \
+  seconds[name] = phases.of(Phase::phase);       \
+  shares[name] = phases.share(Phase::phase);     \
+  meanings[name] = sentence;
+  SHOAL_PHASES(SHOAL_ADD)
+#undef SHOAL_ADD
+  return {{"thread_seconds", phases.total()},
+          {"seconds", seconds},
+          {"shares", shares},
+          {"routing_share", phases.routing_share()},
+          {"meanings", meanings}};
+}
+
 /// As --environment takes it.
 std::string environment_text(const EnvironmentOptions& environment) {
   if (environment.kind == EnvironmentOptions::Kind::kNone) return "none";
@@ -182,6 +197,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["previews_count"] = result.previews_count;
   json["preview_seconds"] = result.preview_seconds;
   json["threads_count"] = result.threads;
+  json["phases"] = phases_json(result.phases);
   json["rays_per_second"] = static_cast<double>(rays.rays_traced_count) / result.seconds;
   json["counters"] = Json::parse(counters_json(result.counters));
   Json& units = json["counter_list"] = Json::array();
@@ -236,6 +252,11 @@ std::string traffic_table(const std::vector<TrafficColumn>& columns) {
   row("million rays a second", [](R r, C, T t) {
     return fmt::format("{:.3f}", static_cast<double>(t.rays_traced_count) / r.seconds * 1e-6);
   });
+  const auto percent = [](double share) { return fmt::format("{:.1f} %", 100 * share); };
+  row("time in routing", [&](R r, C, T) { return percent(r.phases.routing_share()); });
+  for (size_t i = 0; i < kPhaseCount; ++i) {
+    row(fmt::format("time in {}", kPhaseNames[i]), [&](R r, C, T) { return percent(r.phases.share(Phase(i))); });
+  }
   return text;
 }
 

@@ -20,13 +20,14 @@ constexpr uint64_t kSamplesPerGrab = 256;
 
 class SortedWorker {
  public:
-  SortedWorker(RenderContext& context, SortedPaths& paths, std::atomic<uint64_t>& next_place)
-      : context_(context), paths_(paths), next_place_(next_place), worker_(context),
+  SortedWorker(RenderContext& context, unsigned thread, SortedPaths& paths, std::atomic<uint64_t>& next_place)
+      : context_(context), paths_(paths), next_place_(next_place), worker_(context, thread),
         group_limit_(rays_under_way(context.cache, *context.scene.file, context.threads, RayGroup::kCapacity)),
         held_(group_limit_) {}
 
   /// Begins new samples in the paths [first, last) that are free: their camera rays join the next wave.
   void begin_paths(uint32_t first, uint32_t last) {
+    worker_.enter(Phase::kPaths);
     uint32_t free = 0;
     for (uint32_t path = first; path < last; ++path) free += paths_.free(path) ? 1 : 0;
     SampleRange samples;
@@ -45,14 +46,18 @@ class SortedWorker {
     grab_ = std::clamp<uint64_t>(count / (8 * context_.threads), 1, kRaysPerGrab);
     count_ = count;
     place_ = last_ = 0;
-    const auto decide = [this](uint32_t slot, const GroupRay& member, TreeletId treelet) {
-      return treelet != kNoIndex ? hold(slot, member, treelet) : finish(slot, member);
+    const auto decide = [this](uint32_t slot, const GroupRay& member, TreeletId treelet) -> const std::byte* {
+      if (treelet != kNoIndex) return hold(slot, member, treelet);
+      held_.release(slot);
+      home_[home_count_++] = slot;
+      return nullptr;
     };
     while (!context_.ended.load(std::memory_order_relaxed)) {
       while (group_.size() < group_limit_ && add_next()) {
       }
       if (group_.size() == 0) break;
-      worker_.step(group_, decide);
+      worker_.step(group_, Phase::kPaging, decide);
+      finish_rays();
       for (uint32_t i = 0; i < ready_count_; ++i) vertex_ready(ready_[i]);
       ready_count_ = 0;
       if (group_limit_ == 1) worker_.let_go();  // the cache may have room for one page a thread
@@ -68,6 +73,7 @@ class SortedWorker {
 
  private:
   void put(const Ray& ray) {
+    worker_.enter(Phase::kQueue);
     worker_.counters().ray_moved_bytes += sizeof(Ray);
     paths_.put(ray);
   }
@@ -83,6 +89,7 @@ class SortedWorker {
       }
       worker_.report_progress();
     }
+    worker_.enter(Phase::kQueue);
     if (place_ + kFetchAhead < count_) paths_.prefetch(place_ + kFetchAhead);
     worker_.counters().ray_moved_bytes += sizeof(Ray);
     group_.add(paths_.ray_at(place_++), nullptr);
@@ -100,12 +107,16 @@ class SortedWorker {
     });
   }
 
-  const std::byte* finish(uint32_t slot, const GroupRay& member) {
-    worker_.count_leaving(member, kNoIndex);
-    held_.release(slot);
-    const uint32_t path = path_index_of(member.ray);
-    if (worker_.finish_ray(member.ray, paths_.state(path))) ready_[ready_count_++] = path;
-    return nullptr;
+  /// Notes the answers of the rays that came home.
+  void finish_rays() {
+    worker_.enter(Phase::kPaths);
+    for (uint32_t i = 0; i < home_count_; ++i) {
+      const GroupRay& member = group_.ray(home_[i]);
+      worker_.count_leaving(member, kNoIndex);
+      const uint32_t path = path_index_of(member.ray);
+      if (worker_.finish_ray(member.ray, paths_.state(path))) ready_[ready_count_++] = path;
+    }
+    home_count_ = 0;
   }
 
   /// Both rays of the vertex are home: the path ends, or is shaded, and its new rays join the next wave.
@@ -134,7 +145,9 @@ class SortedWorker {
   uint32_t group_limit_;
   HeldPages held_;
   RayGroup group_;
-  uint32_t ready_[RayGroup::kCapacity];  ///< paths whose last ray has come home in this step
+  uint32_t home_[RayGroup::kCapacity];   ///< slots of the rays that came home in this step
+  uint32_t home_count_ = 0;
+  uint32_t ready_[RayGroup::kCapacity];  ///< paths whose last ray did
   uint32_t ready_count_ = 0;
   uint64_t place_ = 0, last_ = 0;  ///< of the wave: what is left of this thread's grab
   uint64_t count_ = 0, grab_ = 0;
@@ -146,8 +159,16 @@ void render_sorted(RenderContext& context, SortedPaths& paths) {
   const unsigned threads = context.threads;
   std::atomic<uint64_t> next_place{0};
   std::vector<std::unique_ptr<SortedWorker>> workers;
-  for (unsigned t = 0; t < threads; ++t) workers.push_back(std::make_unique<SortedWorker>(context, paths, next_place));
+  for (unsigned t = 0; t < threads; ++t) {
+    workers.push_back(std::make_unique<SortedWorker>(context, t, paths, next_place));
+  }
   const auto together = [&](const std::function<void(unsigned)>& step) { run_on_threads(context, step); };
+  const auto sort = [&](const std::function<void(unsigned)>& step) {
+    together([&](unsigned t) {
+      context.phases[t].enter(Phase::kQueue);
+      step(t);
+    });
+  };
   const uint64_t path_count = paths.path_count();
   RaySorter& sorter = paths.sorter;
   while (!context.ended) {
@@ -156,11 +177,11 @@ void render_sorted(RenderContext& context, SortedPaths& paths) {
                               static_cast<uint32_t>(path_count * (t + 1) / threads));
     });
     for (uint32_t pass = 0; pass < RaySorter::kPasses; ++pass) {
-      together([&](unsigned t) { sorter.count(pass, t); });
-      together([&](unsigned t) { sorter.scatter(pass, t); });
+      sort([&](unsigned t) { sorter.count(pass, t); });
+      sort([&](unsigned t) { sorter.scatter(pass, t); });
     }
     if (sorter.size() == 0) break;
-    together([&](unsigned t) { sorter.clear(t); });
+    sort([&](unsigned t) { sorter.clear(t); });
     next_place = 0;
     together([&](unsigned t) { workers[t]->trace(sorter.size()); });
   }

@@ -58,6 +58,10 @@ void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work)
 }
 
 void run_on_threads(RenderContext& context, const std::function<void(unsigned)>& work) {
+  const auto all_enter = [&](Phase phase) {
+    for (PhaseClock& clock : context.phases) clock.enter(phase);
+  };
+  all_enter(Phase::kIdle);  // until they are there, and once they are done
   run_on_threads(context.threads, [&](unsigned thread) {
     try {
       work(thread);
@@ -65,14 +69,18 @@ void run_on_threads(RenderContext& context, const std::function<void(unsigned)>&
       context.ended = true;  // first: the message allocates
       context.fail({ErrorCode::kMemoryCap, "out of memory while rendering: lower --max-memory to what the machine has"});
     }
+    context.phases[thread].enter(Phase::kIdle);
   });
+  all_enter(Phase::kSetup);
 }
 
-RenderWorker::RenderWorker(RenderContext& context)
+RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
     : context_(context),
+      phases_(context.phases[thread]),
       shader_(context.scene, context.tables, context.picture.shading, context.cache) {}
 
 Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
+  enter(Phase::kPaths);
   const PixelSample sample = context_.samples.at(index);
   path.pixel = sample.y * context_.picture.width + sample.x;
   path.sample = sample.sample;
@@ -119,11 +127,16 @@ bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
 }
 
 uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) {
+  enter(Phase::kShading);
+  const uint64_t waited_before = cache_counters_.waited_ticks;
   if (!pin_attributes()) return 0;
   const uint32_t bounce_before = path.bounce;
   ShadeResult result;
   Status status = shader_.shade_hit(path, geometry_.bytes(), attributes_.bytes(), result, shade_counters_,
                                     cache_counters_);
+  if (const uint64_t waited = cache_counters_.waited_ticks - waited_before; waited > 0) {
+    phases_.give_to(Phase::kPaging, waited, now_ticks());
+  }
   if (!status.ok()) {
     context_.fail(std::move(status).error());
     return 0;
@@ -151,9 +164,13 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
   return count;
 }
 
-void RenderWorker::shade_miss(PathState& path) { shader_.shade_miss(path, shade_counters_); }
+void RenderWorker::shade_miss(PathState& path) {
+  enter(Phase::kShading);
+  shader_.shade_miss(path, shade_counters_);
+}
 
 void RenderWorker::end_path(const PathState& path) {
+  enter(Phase::kPaths);
   Vec3 radiance = path.radiance;
   if (!std::isfinite(radiance.x) || !std::isfinite(radiance.y) || !std::isfinite(radiance.z)) {
     radiance = Vec3(0);
@@ -179,6 +196,7 @@ void RenderWorker::count_batch(const PagePin& geometry) {
 }
 
 bool RenderWorker::hold(TreeletId treelet) {
+  enter(Phase::kPaging);
   let_go();
   geometry_ = pin(treelet);
   if (!geometry_) return false;
@@ -222,6 +240,7 @@ bool RenderWorker::pin_attributes() {
 }
 
 void RenderWorker::report_progress() {
+  enter(Phase::kReporting);
   context_.disk_read_bytes += cache_counters_.disk_read_bytes - disk_bytes_reported_;
   disk_bytes_reported_ = cache_counters_.disk_read_bytes;
   if (context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed)) {

@@ -8,6 +8,7 @@
 #include "engine/camera.h"
 #include "engine/film.h"
 #include "engine/path_ray.h"
+#include "engine/phase_clock.h"
 #include "engine/ray_group.h"
 #include "engine/render.h"
 #include "engine/sample_order.h"
@@ -47,6 +48,7 @@ struct RenderContext {
   Status error{};
   RenderCounters counters{};
   double start_seconds = 0;
+  std::vector<PhaseClock> phases{};  ///< one a thread, since the render began
 
   void fail(Error error);
   /// Takes up to `wanted` samples that nobody has begun; none are left, for now or for good, when it is empty.
@@ -69,15 +71,24 @@ class UsualBatches;
 
 class RenderWorker {
  public:
-  explicit RenderWorker(RenderContext& context);
+  /// Of the thread with this index.
+  RenderWorker(RenderContext& context, unsigned thread);
+
+  /// What this thread does from now on. The functions below that take long enter their phase themselves.
+  void enter(Phase phase) { phases_.enter(phase); }
 
   /// Begins sample `index` in `path`; returns its camera ray.
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
 
-  /// Every ray of `group` goes on by one treelet; see RayGroup::step.
+  /// Every ray of `group` goes on by one treelet; see RayGroup. `sending`: the phase of what `decide` does.
   template <class Decide>
-  void step(RayGroup& group, const Decide& decide) {
-    counters_.treelet_visits_count += group.step(context_.scene.top_tree, trace_counters_, decide);
+  void step(RayGroup& group, Phase sending, const Decide& decide) {
+    enter(Phase::kTopTree);
+    group.address(context_.scene.top_tree);
+    enter(sending);
+    group.send(context_.scene.top_tree, decide);
+    enter(Phase::kTraversal);
+    counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_);
   }
   /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
   void count_leaving(const GroupRay& member, TreeletId next);
@@ -123,6 +134,7 @@ class RenderWorker {
 
  private:
   RenderContext& context_;
+  PhaseClock& phases_;
   Shader shader_;
   PagePin geometry_, attributes_;
   TreeletId in_hand_ = kNoIndex;

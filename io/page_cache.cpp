@@ -5,8 +5,25 @@
 
 #include "io/mapped_pages.h"
 #include "io/page_cache_state.h"
+#include "io/ticks.h"
 
 namespace shoal {
+namespace {
+
+/// Counts the time until it is gone.
+class WaitedTime {
+ public:
+  explicit WaitedTime(CacheCounters& counters) : counters_(counters), start_(now_ticks()) {}
+  ~WaitedTime() { counters_.waited_ticks += now_ticks() - start_; }
+  WaitedTime(const WaitedTime&) = delete;
+  WaitedTime& operator=(const WaitedTime&) = delete;
+
+ private:
+  CacheCounters& counters_;
+  uint64_t start_;
+};
+
+}  // namespace
 
 void CacheCounters::add(const CacheCounters& other) {
   page_requests_count += other.page_requests_count;
@@ -21,6 +38,7 @@ void CacheCounters::add(const CacheCounters& other) {
   treelet_load_bytes += other.treelet_load_bytes;
   attribute_loads_count += other.attribute_loads_count;
   texture_loads_count += other.texture_loads_count;
+  waited_ticks += other.waited_ticks;
 }
 
 bool PageCache::State::try_pin(PageId page) {
@@ -142,6 +160,14 @@ uint64_t PageCache::minimum_capacity_bytes(const PageFile& file, unsigned thread
   return sum * threads;
 }
 
+uint64_t PageCache::every_page_bytes(const PageFile& file) {
+  uint64_t sum = 0;
+  for (const PageRecord& record : file.records()) {
+    if (record.kind != PageKind::kTable) sum += PageBuffers::charge_bytes(record.raw_bytes);
+  }
+  return sum;
+}
+
 uint64_t PageCache::overhead_bytes(const PageFile& file, const PagingOptions& paging) {
   // A vector that grows holds up to twice what it needs.
   return file.page_count() * (sizeof(PageSlot) + 2 * sizeof(PageId) + 2 * sizeof(EvictionCandidate)) +
@@ -160,6 +186,7 @@ Result<PagePin> PageCache::pin(PageId page, CacheCounters& counters) {
     counters.page_hits_count += 1;
     return PagePin(*this, page, s.slots[page].data, s.page_bytes(page));
   }
+  const WaitedTime waited(counters);
   std::unique_lock lock(s.mutex);
   for (auto under_way = s.loads.find(page); under_way != s.loads.end(); under_way = s.loads.find(page)) {
     const std::shared_ptr<PageLoad> load = under_way->second;

@@ -46,6 +46,7 @@ struct CacheCounters {
   uint64_t treelet_load_bytes = 0;   ///< decoded bytes of those
   uint64_t attribute_loads_count = 0;
   uint64_t texture_loads_count = 0;
+  uint64_t waited_ticks = 0;  ///< in pin(), for pages that were not there: reading, decoding, waiting (io/ticks.h)
 
   void add(const CacheCounters& other);
 };
@@ -100,6 +101,9 @@ class PageCache {
   /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread,
   /// when each pins one page of a kind at a time. Tables are not read through the cache.
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
+
+  /// The capacity that holds every page of the file, tables left out: then nothing is ever evicted.
+  static uint64_t every_page_bytes(const PageFile& file);
 
   /// Memory that the cache takes beside its capacity: its slots, and room to rank what is resident.
   static uint64_t overhead_bytes(const PageFile& file, const PagingOptions& paging = {});

@@ -26,7 +26,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
                   "--tonemap", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted"}},
-      {"compare", {"--orders", "--out", "--width", "--spp", "--max-memory"}},
+      {"compare", {"--orders", "--out", "--runs", "--width", "--spp", "--max-memory"}},
       {"info", {"--json"}},
       {"verify", {"file"}},
       {"diff", {"--json", "--cost-maps"}},

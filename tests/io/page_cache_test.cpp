@@ -77,6 +77,20 @@ TEST(PageCache, GivesThePagesAndCountsThem) {
   EXPECT_EQ(cache.peak_resident_bytes(), charged);
 }
 
+TEST(PageCache, OnlyPagesThatAreNotThereTakeTime) {
+  MemoryFileSystem fs;
+  const auto file = write_pages(fs, "pages", equal_pages(2));
+  PageCache cache(*file, 2 * block_bytes(4096));
+  CacheCounters counters;
+  ASSERT_TRUE(cache.pin(0, counters).ok());
+  const uint64_t waited = counters.waited_ticks;
+  EXPECT_GT(waited, 0u);
+  ASSERT_TRUE(cache.pin(0, counters).ok());
+  EXPECT_EQ(counters.waited_ticks, waited) << "a hit";
+  ASSERT_TRUE(cache.pin(1, counters).ok());
+  EXPECT_GT(counters.waited_ticks, waited);
+}
+
 TEST(PageCache, EvictsOnlyUnpinnedPages) {
   MemoryFileSystem fs;
   const auto file = write_pages(fs, "a", equal_pages(20));
