@@ -11,8 +11,8 @@
 //              the room of a page only when that one is worth less than the work that waits (EvictionPolicy::worth), so it
 //              cannot thrash, and never waits.
 //   when full  pin() waits for another thread's pin to end when everything resident is pinned. This
-//              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at
-//              most kMaxPinsPerThread pages, or more that fit in an eighth of the capacity with those of other threads.
+//              cannot deadlock as long as capacity_bytes >= minimum_capacity_bytes(): each thread holds at most
+//              kMaxPinsPerThread pages, or what fits in an eighth with other threads; any where every page fits.
 //   cost       a hit is one atomic increment and no lock; a miss reads, hashes and decompresses outside the lock; a
 //              prefetch takes the lock and one system call.
 #pragma once
