@@ -5,6 +5,7 @@
 
 #include "bench/ray_sort.h"
 #include "engine/clock.h"
+#include "treelets/trace_scene.h"
 
 namespace shoal::bench {
 namespace {
@@ -16,29 +17,45 @@ constexpr uint64_t kFetchAhead = 8;    // sorted rays lie anywhere: asked for so
 /// Traces rays to their ends, each by itself, several under way.
 class DepthFirstTracer {
  public:
+  explicit DepthFirstTracer(const MemoryScene& scene) : pages_(scene.page_table()), tracer_(scene.top_tree(), pages_.data()) {}
+
   /// `more` gives the next ray, or returns false; `done` takes each ray at its end.
   template <class More, class Done>
-  void trace(const MemoryScene& scene, const More& more, const Done& done) {
-    Ray ray;
-    bool left = true;
-    const auto decide = [&](uint32_t, const GroupRay& member, TreeletId treelet) -> const std::byte* {
-      if (treelet != kNoIndex) return scene.pages[treelet].data();
-      counts_.node_tests += member.node_tests, counts_.triangle_tests += member.triangle_tests;
-      done(member.ray);
-      return nullptr;
+  void trace(const MemoryScene&, const More& more, const Done& done) {
+    struct Stream final : RayStream {
+      DepthFirstTracer& tracer;
+      const More& more;
+      const Done& done_ray;
+      bool left = true;
+      Stream(DepthFirstTracer& t, const More& m, const Done& d) : tracer(t), more(m), done_ray(d) {}
+      Ray* next() override {
+        if (!left || tracer.free_count_ == 0) return nullptr;
+        Ray& ray = tracer.rays_[tracer.free_[tracer.free_count_ - 1]];
+        if (!(left = more(ray))) return nullptr;
+        --tracer.free_count_;
+        return &ray;
+      }
+      void done(Ray& ray, const RayWork& work) override {
+        tracer.counts_.node_tests += work.node_tests, tracer.counts_.triangle_tests += work.triangle_tests;
+        tracer.counts_.treelet_visits += work.treelets;
+        done_ray(ray);
+        tracer.free_[tracer.free_count_++] = static_cast<uint32_t>(&ray - tracer.rays_);
+      }
+      const std::byte* bring(TreeletId) override { return nullptr; }
     };
-    for (;;) {
-      while (left && !group_.full() && (left = more(ray))) group_.add(ray, nullptr);
-      if (group_.size() == 0) return;
-      counts_.treelet_visits += group_.step(scene.top_tree(), counters_, decide);
-    }
+    Stream stream(*this, more, done);
+    tracer_.trace(stream, counters_);
   }
   const TraceCounts& counts() const { return counts_; }
 
  private:
-  RayGroup group_;
+  static constexpr uint32_t kRays = 4096;
+  std::vector<const std::byte*> pages_;
+  SceneTracer tracer_;
   TraceCounters counters_;
   TraceCounts counts_;
+  Ray rays_[kRays];
+  uint32_t free_[kRays], free_count_ = [this] { for (uint32_t i = 0; i < kRays; ++i) free_[i] = i; return kRays; }();
 };
 
 /// Each ray to its end, in the order given or sorted first.
@@ -53,9 +70,9 @@ class DepthFirstOrder : public RayOrder {
     OrderRun result;
     result.seconds = run_together(threads_, [&](unsigned thread) {
       if (sorter_ != nullptr) sorter_->sort(set.rays, thread);
-      const auto tracer = std::make_unique<DepthFirstTracer>();
-      for (uint64_t first; (first = next.fetch_add(kRaysPerGrab)) < set.rays.size();) {
-        trace_range(set, first, std::min<uint64_t>(first + kRaysPerGrab, set.rays.size()), answers, *tracer);
+      const auto tracer = std::make_unique<DepthFirstTracer>(scene_);
+      for (uint64_t first; (first = next.fetch_add(4096)) < set.rays.size();) {
+        trace_range(set, first, std::min<uint64_t>(first + 4096, set.rays.size()), answers, *tracer);
       }
       const std::lock_guard guard(mutex);
       result.counts.add(tracer->counts());
@@ -127,7 +144,7 @@ double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsign
   if (sampled == 0) return 0;
   std::vector<double> seconds(threads);
   run_together(threads, [&](unsigned thread) {
-    const auto tracer = std::make_unique<DepthFirstTracer>();
+    const auto tracer = std::make_unique<DepthFirstTracer>(scene);
     float kept = 0;  // so that no pass is left out
     const auto trace_group = [&](uint64_t group) {
       uint64_t i = group * kGroupRays;

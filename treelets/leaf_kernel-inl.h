@@ -20,9 +20,11 @@ using F16 = hn::CappedTag<float, 16>;
 using I16 = hn::RebindToSigned<F16>;
 using V16 = hn::Vec<F16>;
 inline constexpr size_t kLeafLanes = hn::MaxLanes(F16());
+/// Room for the roundings of a product and a quotient.
+inline constexpr float kReachScale = 1 + 0x1p-20f;
 
 struct ShearedLanes {
-  V16 x, y;
+  V16 x, y, z;  ///< z: along RaySpace::kz from the origin, not sheared
 };
 
 /// A coordinate of the vertices from `first` on. Reads past the last vertex, inside the page and 64 bytes after it.
@@ -42,7 +44,7 @@ HWY_INLINE ShearedLanes shear_vertices(const RaySpace& ray, const LeafView& leaf
   const auto x = load_vertices(leaf, ray.kx, first), y = load_vertices(leaf, ray.ky, first);
   const auto z = hn::Sub(load_vertices(leaf, ray.kz, first), hn::Set(f, ray.origin[ray.kz]));
   return {hn::Sub(hn::Sub(x, hn::Set(f, ray.origin[ray.kx])), hn::Mul(hn::Set(f, ray.shear_x), z)),
-          hn::Sub(hn::Sub(y, hn::Set(f, ray.origin[ray.ky])), hn::Mul(hn::Set(f, ray.shear_y), z))};
+          hn::Sub(hn::Sub(y, hn::Set(f, ray.origin[ray.ky])), hn::Mul(hn::Set(f, ray.shear_y), z)), z};
 }
 
 HWY_INLINE hn::Vec<I16> corner_indices(const LeafView& leaf, uint32_t k, size_t first) {
@@ -63,7 +65,8 @@ struct LeafCorners {
     for (uint32_t k = 0; k < 3; ++k) {
       index[k] = corner_indices(leaf, k, 0);
       const auto lanes = hn::IndicesFromVec(f, hn::And(index[k], hn::Set(i, 15)));
-      corner[k] = {hn::TableLookupLanes(table.x, lanes), hn::TableLookupLanes(table.y, lanes)};
+      corner[k] = {hn::TableLookupLanes(table.x, lanes), hn::TableLookupLanes(table.y, lanes),
+                   hn::TableLookupLanes(table.z, lanes)};
     }
     for (uint32_t first = 16; first < leaf.vertex_count; first += 16) {
       table = shear_vertices(ray, leaf, first);
@@ -71,7 +74,8 @@ struct LeafCorners {
         const auto lanes = hn::IndicesFromVec(f, hn::And(index[k], hn::Set(i, 15)));
         const auto here = hn::RebindMask(f, hn::Gt(index[k], hn::Set(i, static_cast<int32_t>(first) - 1)));
         corner[k] = {hn::IfThenElse(here, hn::TableLookupLanes(table.x, lanes), corner[k].x),
-                     hn::IfThenElse(here, hn::TableLookupLanes(table.y, lanes), corner[k].y)};
+                     hn::IfThenElse(here, hn::TableLookupLanes(table.y, lanes), corner[k].y),
+                     hn::IfThenElse(here, hn::TableLookupLanes(table.z, lanes), corner[k].z)};
       }
     }
   }
@@ -80,7 +84,8 @@ struct LeafCorners {
 #else
 /// The same for narrower vectors: sheared vertices go through memory.
 struct LeafCorners {
-  HWY_ALIGN float x[kMaxLeafVertices + kLeafLanes], y[kMaxLeafVertices + kLeafLanes];
+  HWY_ALIGN float x[kMaxLeafVertices + kLeafLanes], y[kMaxLeafVertices + kLeafLanes],
+      z[kMaxLeafVertices + kLeafLanes];
   const LeafView& leaf;
 
   HWY_INLINE LeafCorners(const RaySpace& ray, const LeafView& view) : leaf(view) {
@@ -88,20 +93,33 @@ struct LeafCorners {
       const ShearedLanes sheared = shear_vertices(ray, leaf, first);
       hn::StoreU(sheared.x, F16(), x + first);
       hn::StoreU(sheared.y, F16(), y + first);
+      hn::StoreU(sheared.z, F16(), z + first);
     }
   }
   HWY_INLINE ShearedLanes at(uint32_t k, size_t first) const {
     // Lanes past the last triangle hold other bytes: kept inside the leaf, their result is dropped.
     const auto last = hn::Set(I16(), static_cast<int32_t>(leaf.vertex_count) - 1);
     const auto index = hn::Min(corner_indices(leaf, k, first), last);
-    return {hn::GatherIndex(F16(), x, index), hn::GatherIndex(F16(), y, index)};
+    return {hn::GatherIndex(F16(), x, index), hn::GatherIndex(F16(), y, index), hn::GatherIndex(F16(), z, index)};
   }
 };
 #endif
 
-/// The triangles of a leaf that the exact test may accept: all but those with edge functions of certainly different
-/// signs, by the float arithmetic of triangle_test.h.
-HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf) {
+/// Lanes whose triangle the exact test leaves out for where it begins and ends along RaySpace::kz: its own box
+/// (triangle_test.h) is entered behind `t` or left before the ray begins. The box has one pad and roundings of about
+/// u R, which are less than a pad: so two pads, and room for the roundings of the products.
+HWY_INLINE hn::Mask<F16> out_of_reach(const RaySpace& ray, const ShearedLanes corner[3], float t) {
+  const F16 f;
+  const auto inverse = hn::Set(f, ray.inverse[ray.kz]);
+  const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse), c = hn::Mul(corner[2].z, inverse);
+  const float pads = 2 * ray.pad * std::abs(ray.inverse[ray.kz]);
+  return hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), hn::Set(f, t * kReachScale + pads)),
+                hn::Lt(hn::Max(hn::Max(a, b), c), hn::Set(f, -pads)));
+}
+
+/// The triangles of a leaf that the exact test may accept at or before `t`: all but those with edge functions of
+/// certainly different signs, by the float arithmetic of triangle_test.h, and those out of reach.
+HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf, float t) {
   const F16 f;
   const LeafCorners corners(ray, leaf);
   uint32_t rejected = 0;
@@ -117,7 +135,7 @@ HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf) {
       negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
     }
     uint8_t bits[8] = {};
-    hn::StoreMaskBits(f, hn::And(positive, negative), bits);
+    hn::StoreMaskBits(f, hn::Or(hn::And(positive, negative), out_of_reach(ray, corner, t)), bits);
     rejected |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << first;
   }
   return ~rejected & ((1u << leaf.triangle_count) - 1);

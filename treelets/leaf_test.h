@@ -27,14 +27,10 @@ inline bool passes_coverage(const TreeletView& treelet, const Ray& ray, const Tr
                     ray.instance, primitive);
 }
 
-/// Tests triangle `i` of the leaf at `offset`. Returns true when an any-hit ray is done.
-inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t i,
-                          const RaySpace& space, const TraceJob& job, TraceCounters& counters) {
-  Ray& ray = *job.ray;
-  TriangleHit hit;
-  if (!intersect_triangle(space, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), ray.t, hit)) {
-    return false;
-  }
+/// What becomes of a hit on triangle `i` of the leaf at `offset`, at or before ray.t. Returns true when an any-hit ray is
+/// done.
+inline bool take_hit(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t i,
+                     const TriangleHit& hit, Ray& ray, TreeletId id, TraceCounters& counters) {
   const bool any_hit = ray.any_hit();
   if (any_hit && !(hit.t < ray.t)) return false;
   const uint32_t primitive = leaf.primitive(i);
@@ -43,10 +39,18 @@ inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint
       !passes_coverage(treelet, ray, hit, leaf.header().first_ordinal + i, primitive, counters)) {
     return false;
   }
-  ray.hit = {ray.instance, primitive, job.entry.treelet, offset << 4 | i};
+  ray.hit = {ray.instance, primitive, id, offset << 4 | i};
   if (any_hit) return true;
   ray.t = hit.t;
   return false;
+}
+
+/// Tests triangle `i` of the leaf at `offset`. Returns true when an any-hit ray is done.
+inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t i,
+                          const RaySpace& space, const TraceJob& job, TraceCounters& counters) {
+  TriangleHit hit;
+  return intersect_triangle(space, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), job.ray->t, hit) &&
+         take_hit(treelet, leaf, offset, i, hit, *job.ray, job.entry.treelet, counters);
 }
 
 }  // namespace shoal

@@ -27,16 +27,20 @@ struct TopTreeTables {
   float world_pad_scale, world_extent;
 };
 
-/// The space of the tree that the ray's cursor is in.
-inline const RaySpace& space_of(const TopTreeTables& tree, const Ray& ray, RayContext& context) {
-  if (ray.instance != kNoIndex) return context.object_space(ray, tree.instances[ray.instance]);
+inline const RaySpace& world_space(const Ray& ray, float pad_scale, float extent, RayContext& context) {
   if (!context.world_ready) {
     context.world = prepare_ray(ray.origin, ray.direction);
-    const float reach = max_abs(context.world.origin) + tree.world_extent;
-    set_pad(context.world, tree.world_pad_scale * reach + std::numeric_limits<float>::min(), reach);
+    const float reach = max_abs(context.world.origin) + extent;
+    set_pad(context.world, pad_scale * reach + std::numeric_limits<float>::min(), reach);
     context.world_ready = true;
   }
   return context.world;
+}
+
+/// The space of the tree that the ray's cursor is in.
+inline const RaySpace& space_of(const TopTreeTables& tree, const Ray& ray, RayContext& context) {
+  if (ray.instance != kNoIndex) return context.object_space(ray, tree.instances[ray.instance]);
+  return world_space(ray, tree.world_pad_scale, tree.world_extent, context);
 }
 
 /// Where a walk stands: before the children of a node, or behind one of them.
@@ -326,6 +330,10 @@ uint32_t TopTree::next(Ray& ray, RayContext& context, uint64_t& node_tests) cons
 uint32_t TopTree::next(Ray& ray, uint64_t& node_tests) const {
   RayContext context;
   return next(ray, context, node_tests);
+}
+
+const RaySpace& TopTree::world_space(const Ray& ray, RayContext& context) const {
+  return shoal::world_space(ray, world_pad_scale_, world_extent_, context);
 }
 
 Bounds3 TopTree::bounds() const {

@@ -61,7 +61,8 @@ struct TraversalOptions {
   uint32_t more_levels = 32;  ///< levels for which Ray::more is used, 0..32; less is slower, never different
 };
 
-struct RayContext;  // treelets/ray_space.h
+struct RayContext;  // treelets/ray_space.h, as RaySpace
+struct RaySpace;
 
 /// One ray in search of its next treelet.
 struct NextJob {
@@ -104,6 +105,10 @@ class TopTree {
   Bounds3 bounds() const;  ///< of the scene, world space
   uint64_t resident_bytes() const;
   uint32_t more_levels() const { return options_.more_levels; }
+  /// One instance whose space is the world: its tree is the whole top tree.
+  bool single_identity() const { return single_identity_; }
+  /// The ray in the space of the tree over instances, kept in its context.
+  const RaySpace& world_space(const Ray& ray, RayContext& context) const;
 
  private:
   std::vector<TopNode> nodes_;

@@ -7,6 +7,7 @@
 
 #include <hwy/cache_control.h>
 
+#include "treelets/hit_kernel-inl.h"
 #include "treelets/leaf_kernel-inl.h"
 #include "treelets/leaf_test.h"
 #include "treelets/node_kernel-inl.h"
@@ -151,7 +152,7 @@ class Tracer {
       TraceLane& lane = lanes_[list[i]];
       const LeafView leaf = lane.leaf();
       lane.job->triangle_tests += leaf.triangle_count;
-      lane.candidates = find_candidates(*lane.space, leaf);
+      lane.candidates = find_candidates(*lane.space, leaf, lane.job->ray->t);
     }
     for (uint32_t i = 0; i < list.size(); ++i) {
       TraceLane& lane = lanes_[list[i]];
@@ -165,7 +166,10 @@ class Tracer {
     const LeafView leaf = lane.leaf();
     for (uint32_t mask = lane.candidates; mask != 0; mask &= mask - 1) {
       const uint32_t i = static_cast<uint32_t>(std::countr_zero(mask));
-      if (test_triangle(treelet, leaf, leaf_offset(lane.ref), i, *lane.space, *lane.job, counters_)) {
+      TriangleHit hit;
+      Ray& ray = *lane.job->ray;
+      if (intersect_stored(*lane.space, leaf, i, ray.t, hit) &&
+          take_hit(treelet, leaf, leaf_offset(lane.ref), i, hit, ray, lane.job->entry.treelet, counters_)) {
         lane.size = 0;  // an any-hit ray is done
         return;
       }

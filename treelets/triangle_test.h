@@ -57,9 +57,8 @@ inline bool cross_line(const RaySpace& ray, const Vec3& p0, const Vec3& p1, cons
   return true;
 }
 
-/// cross_box() for the triangle's own box, in lanes. Requires: finite corners.
-inline BoxSpan cross_own_box(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2) {
-  const Lanes a = lanes_set(p0.x, p0.y, p0.z), b = lanes_set(p1.x, p1.y, p1.z), c = lanes_set(p2.x, p2.y, p2.z);
+/// cross_box() for the triangle's own box, in lanes: of its corners. Requires: finite corners.
+inline BoxSpan cross_own_box(const RaySpace& ray, Lanes a, Lanes b, Lanes c) {
   const Lanes origin = lanes_load3(ray.origin), inverse = lanes_load3(ray.inverse), pad = lanes_set(ray.pad);
   const Lanes most = lanes_set(std::numeric_limits<float>::max());
   const Lanes least = lanes_set(-std::numeric_limits<float>::max());
@@ -78,7 +77,8 @@ inline BoxSpan cross_own_box(const RaySpace& ray, const Vec3& p0, const Vec3& p1
 inline bool intersect_triangle(const RaySpace& ray, const Vec3& p0, const Vec3& p1, const Vec3& p2, float t_max,
                                TriangleHit& hit) {
   if (!triangle_test::cross_line(ray, p0, p1, p2, hit)) return false;
-  const BoxSpan span = triangle_test::cross_own_box(ray, p0, p1, p2);
+  const BoxSpan span = triangle_test::cross_own_box(ray, lanes_set(p0.x, p0.y, p0.z), lanes_set(p1.x, p1.y, p1.z),
+                                                    lanes_set(p2.x, p2.y, p2.z));
   if (!span.entered(t_max)) return false;
   hit.t = std::min(std::max(hit.t, span.t_near), span.t_far);
   return hit.t > 0 && hit.t <= t_max;

@@ -1,0 +1,99 @@
+// One triangle of a leaf against one ray in lanes: the bits of intersect_triangle() (treelets/triangle_test.h), by the
+// same operations in the same order. Included once a target (foreach_target.h).
+#if defined(SHOAL_TREELETS_HIT_KERNEL_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SHOAL_TREELETS_HIT_KERNEL_INL_H
+#undef SHOAL_TREELETS_HIT_KERNEL_INL_H
+#else
+#define SHOAL_TREELETS_HIT_KERNEL_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "treelets/leaf_test.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace shoal {
+namespace HWY_NAMESPACE {
+
+#if HWY_ARCH_X86 && HWY_MAX_BYTES >= 32
+
+namespace hn = hwy::HWY_NAMESPACE;
+using F4 = hn::FixedTag<float, 4>;
+using D4 = hn::FixedTag<double, 4>;
+using V4 = hn::Vec<F4>;
+
+/// A coordinate of the three corners; the fourth lane is zero.
+HWY_INLINE V4 load_corners(const LeafView& leaf, uint32_t axis, const uint32_t vertex[3]) {
+  if (leaf.has_floats()) {
+    const float* at = leaf.floats(axis);
+    return V4{lanes_set(at[vertex[0]], at[vertex[1]], at[vertex[2]])};
+  }
+  const uint16_t* low = leaf.low(axis);
+  const uint8_t* high = leaf.high(axis);
+  const uint32_t present = 0u - (leaf.header().flags >> axis & 1u), base = leaf.base(axis);
+  const auto at = [&](uint32_t v) {
+    return std::bit_cast<float>(base + low[v] + ((uint32_t{high[v]} & present) << 16));
+  };
+  return V4{lanes_set(at(vertex[0]), at(vertex[1]), at(vertex[2]))};
+}
+
+HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float t_max, TriangleHit& hit) {
+  const F4 f;
+  const D4 d;
+  // Sheared corners, a lane each.
+  HWY_ALIGN float words[3][4];
+  for (int axis = 0; axis < 3; ++axis) hn::Store(corners[axis], f, words[axis]);
+  const auto z = hn::Sub(hn::Load(f, words[ray.kz]), hn::Set(f, ray.origin[ray.kz]));
+  const auto x = hn::Sub(hn::Sub(hn::Load(f, words[ray.kx]), hn::Set(f, ray.origin[ray.kx])),
+                         hn::Mul(hn::Set(f, ray.shear_x), z));
+  const auto y = hn::Sub(hn::Sub(hn::Load(f, words[ray.ky]), hn::Set(f, ray.origin[ray.ky])),
+                         hn::Mul(hn::Set(f, ray.shear_y), z));
+  // Edge functions of c b, a c, b a.
+  HWY_ALIGN static constexpr int32_t kCab[4] = {2, 0, 1, 3}, kBca[4] = {1, 2, 0, 3};
+  const auto cab = hn::SetTableIndices(f, kCab), bca = hn::SetTableIndices(f, kBca);
+  const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(x, cab)), from_y = hn::PromoteTo(d, hn::TableLookupLanes(y, cab));
+  const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(x, bca)), to_y = hn::PromoteTo(d, hn::TableLookupLanes(y, bca));
+  const auto edge = hn::Sub(hn::Mul(from_x, to_y), hn::Mul(from_y, to_x));
+  const auto corner = hn::FirstN(d, 3);
+  const auto none = hn::Zero(d);
+  const double eu = hn::ExtractLane(edge, 0), ev = hn::ExtractLane(edge, 1), ew = hn::ExtractLane(edge, 2);
+  const double det = eu + ev + ew;
+  const bool negative = !hn::AllFalse(d, hn::And(corner, hn::Lt(edge, none)));
+  const bool positive = !hn::AllFalse(d, hn::And(corner, hn::Gt(edge, none)));
+  if ((negative & positive) | (det == 0)) return false;
+  const double inverse = 1 / det;
+  const auto b = hn::Mul(edge, hn::Set(d, inverse));
+  const auto bz = hn::Mul(b, hn::PromoteTo(d, z));
+  const double sum = hn::ExtractLane(bz, 0) + hn::ExtractLane(bz, 1) + hn::ExtractLane(bz, 2);
+  hit.t = static_cast<float>(sum / ray.direction[ray.kz]);
+
+  const BoxSpan span = triangle_test::cross_own_box(
+      ray, lanes_set(words[0][0], words[1][0], words[2][0]), lanes_set(words[0][1], words[1][1], words[2][1]),
+      lanes_set(words[0][2], words[1][2], words[2][2]));
+  if (!span.entered(t_max)) return false;
+  hit.t = std::min(std::max(hit.t, span.t_near), span.t_far);
+  if (!(hit.t > 0 && hit.t <= t_max)) return false;
+  hit.b1 = static_cast<float>(hn::ExtractLane(b, 1));
+  hit.b2 = static_cast<float>(hn::ExtractLane(b, 2));
+  return true;
+}
+
+HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max, TriangleHit& hit) {
+  const uint32_t vertex[3] = {leaf.corner(0)[i], leaf.corner(1)[i], leaf.corner(2)[i]};
+  const V4 corners[3] = {load_corners(leaf, 0, vertex), load_corners(leaf, 1, vertex), load_corners(leaf, 2, vertex)};
+  return intersect_lanes(ray, corners, t_max, hit);
+}
+
+#else
+
+HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max, TriangleHit& hit) {
+  return intersect_triangle(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), t_max, hit);
+}
+
+#endif
+
+}  // namespace HWY_NAMESPACE
+}  // namespace shoal
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,69 @@
+// Rays through a scene whose treelets are all in memory, each from its start to its end: one stack leads through the
+// top tree and the treelets, so that a ray never looks for its place in the top tree again. For orders that hold every
+// page; where pages come and go, TopTree::next and trace_treelets. Answers are the same to the bit.
+// Called by engine/render_depth_first and bench/against_embree.
+//
+// Two ways, chosen by what the last rays did (docs/decisions/0018): packets, which test a box for 16 rays at once, while
+// enough rays enter the same nodes (camera rays, shadow rays, bounces in small scenes), else rays by themselves, several
+// in turn.
+//
+// Properties and assumptions
+//   order      rays end in any order and do not affect each other.
+//   threads    any number, each with a tracer and a stream of its own.
+//   memory     fixed: about 1.3 MiB a tracer, most of it stack that is hardly ever touched.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "treelets/trace_treelet.h"
+
+namespace shoal {
+
+/// What one ray took.
+struct RayWork {
+  uint32_t node_tests = 0, triangle_tests = 0;
+  uint32_t treelets = 0;  ///< entered
+};
+
+/// Where rays come from and go to.
+class RayStream {
+ public:
+  virtual ~RayStream() = default;
+  /// The next ray, as it was begun (no cursor, no instance), which stays where it is until done(); nullptr: there is
+  /// none for now. Asked again as long as rays are under way, so one may be there after a done().
+  /// Give some hundred rays before the first is done, better thousands: packets are filled from them.
+  virtual Ray* next() = 0;
+  /// The answer of `ray` is known.
+  virtual void done(Ray& ray, const RayWork& work) = 0;
+  /// Brings a page that the table does not have, and keeps it; nullptr: it cannot, and rays go around it.
+  virtual const std::byte* bring(TreeletId treelet) = 0;
+};
+
+/// Decoded geometry pages by treelet, with bytes behind them as trace_treelets() requires; nullptr: not in memory yet.
+using PageTable = const std::byte* const*;
+
+enum class RayGrouping { kAuto, kPackets, kSingle };
+
+class SceneTracer {
+ public:
+  /// Keeps a reference to the tree and the table.
+  SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping = RayGrouping::kAuto);
+  ~SceneTracer();
+  /// Until the stream has no ray left and none is under way.
+  void trace(RayStream& stream, TraceCounters& counters);
+
+ private:
+  bool use_packets() const;
+
+  const TopTree& tree_;
+  PageTable pages_;
+  RayGrouping grouping_;
+  bool deep_;                ///< the top tree may need more stack than there is: every ray goes the slow way
+  bool in_packets_ = true;   ///< what the last rays did better in
+  std::unique_ptr<struct LaneTracer> lanes_;
+  std::unique_ptr<struct PacketTracer> packets_;
+};
+
+}  // namespace shoal
