@@ -269,6 +269,7 @@ class PacketRun {
         stream_.done(*packet.rays[i], trace_slowly(tables_, *packet.rays[i], stream_, counters_));
         continue;
       }
+      packet.rays[i]->instance = kNoIndex;
       stream_.done(*packet.rays[i], {packet.node_tests[i], packet.triangle_tests[i], packet.treelets[i]});
     }
   }

@@ -4,6 +4,7 @@
 #include <hwy/highway.h>
 
 #include "tests/support/built_scene.h"
+#include "tests/support/ray_list_stream.h"
 #include "treelets/trace_treelet_scalar.h"
 
 namespace shoal::testing {
@@ -64,12 +65,14 @@ void expect_same(const Ray& expected, const Ray& found, size_t index) {
   ASSERT_EQ(expected.hit.primitive, found.hit.primitive) << "ray " << index;
 }
 
-/// Scene by scene, ray by ray, for the product's kernel and the scalar reference. Returns the number of hits.
+/// Scene by scene, ray by ray, for the product's kernels and the scalar reference. Returns the number of hits.
 size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t more_levels = 32) {
   EXPECT_TRUE(
       TopTree::check(scene.nodes, scene.entries, scene.instances, static_cast<uint32_t>(scene.pages.size())).ok());
   const TopTree tree(scene.nodes, scene.entries, scene.instances, {more_levels});
   for (const AlignedPage& page : scene.pages) EXPECT_TRUE(check_treelet(page.bytes()).ok());
+  const std::vector<Ray> single = trace_together(tree, scene, rays, RayGrouping::kSingle);
+  const std::vector<Ray> packets = trace_together(tree, scene, rays, RayGrouping::kPackets);
   size_t hits = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
     Ray expected = rays[i], scalar = rays[i], found = rays[i];
@@ -78,9 +81,13 @@ size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t mo
     trace_scene(tree, scene.pages, found, trace_treelet);
     expect_same(expected, scalar, i);
     expect_same(expected, found, i);
+    expect_same(expected, single[i], i);
+    expect_same(expected, packets[i], i);
     // Which occluder an any-hit ray finds depends on the order of its boxes, which are only conservative.
     if (!expected.any_hit()) {
       EXPECT_EQ(std::memcmp(&scalar, &found, sizeof(Ray)), 0) << "ray " << i;
+      EXPECT_EQ(std::memcmp(&scalar, &single[i], sizeof(Ray)), 0) << "ray " << i;
+      EXPECT_EQ(std::memcmp(&scalar, &packets[i], sizeof(Ray)), 0) << "ray " << i;
     }
     if (::testing::Test::HasFatalFailure()) return hits;
     hits += expected.hit.valid();
