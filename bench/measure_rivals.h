@@ -8,9 +8,9 @@
 
 namespace shoal::bench {
 
-inline constexpr size_t kOrderCount = 3;
+inline constexpr size_t kOrderCount = 4;
 inline constexpr MemoryOrder kOrders[kOrderCount] = {MemoryOrder::kDepthFirst, MemoryOrder::kSorted,
-                                                     MemoryOrder::kQueued};
+                                                     MemoryOrder::kQueued, MemoryOrder::kHybrid};
 /// Hits whose distances differ by more than this part are not the same hit...
 inline constexpr float kSameHit = 1e-4f;
 /// ...unless that is what rounding does: so many units in the last place of the scene's largest coordinate. Each of the

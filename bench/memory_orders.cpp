@@ -3,59 +3,43 @@
 #include <atomic>
 #include <mutex>
 
+#include "bench/hybrid_memory_order.h"
 #include "bench/ray_sort.h"
 #include "engine/clock.h"
-#include "treelets/trace_scene.h"
 
 namespace shoal::bench {
 namespace {
 
-constexpr uint64_t kGroupRays = 64;
-constexpr uint64_t kMaxGroups = 2048;  // of the bound: a second or less
+constexpr uint64_t kGroupRays = 64, kHybridGroupRays = 1024;
+constexpr uint64_t kMaxBoundRays = 2048 * kGroupRays;  // a second or less
 constexpr uint64_t kFetchAhead = 8;    // sorted rays lie anywhere: asked for some rays before their turn
 
 /// Traces rays to their ends, each by itself, several under way.
 class DepthFirstTracer {
  public:
-  explicit DepthFirstTracer(const MemoryScene& scene) : pages_(scene.page_table()), tracer_(scene.top_tree(), pages_.data()) {}
-
   /// `more` gives the next ray, or returns false; `done` takes each ray at its end.
   template <class More, class Done>
-  void trace(const MemoryScene&, const More& more, const Done& done) {
-    struct Stream final : RayStream {
-      DepthFirstTracer& tracer;
-      const More& more;
-      const Done& done_ray;
-      bool left = true;
-      Stream(DepthFirstTracer& t, const More& m, const Done& d) : tracer(t), more(m), done_ray(d) {}
-      Ray* next() override {
-        if (!left || tracer.free_count_ == 0) return nullptr;
-        Ray& ray = tracer.rays_[tracer.free_[tracer.free_count_ - 1]];
-        if (!(left = more(ray))) return nullptr;
-        --tracer.free_count_;
-        return &ray;
-      }
-      void done(Ray& ray, const RayWork& work) override {
-        tracer.counts_.node_tests += work.node_tests, tracer.counts_.triangle_tests += work.triangle_tests;
-        tracer.counts_.treelet_visits += work.treelets;
-        done_ray(ray);
-        tracer.free_[tracer.free_count_++] = static_cast<uint32_t>(&ray - tracer.rays_);
-      }
-      const std::byte* bring(TreeletId) override { return nullptr; }
+  void trace(const MemoryScene& scene, const More& more, const Done& done) {
+    Ray ray;
+    bool left = true;
+    const auto decide = [&](uint32_t, const GroupRay& member, TreeletId treelet) -> const std::byte* {
+      if (treelet != kNoIndex) return scene.pages[treelet].data();
+      counts_.node_tests += member.node_tests, counts_.triangle_tests += member.triangle_tests;
+      done(member.ray);
+      return nullptr;
     };
-    Stream stream(*this, more, done);
-    tracer_.trace(stream, counters_);
+    for (;;) {
+      while (left && !group_.full() && (left = more(ray))) group_.add(ray, nullptr);
+      if (group_.size() == 0) return;
+      counts_.treelet_visits += group_.step(scene.top_tree(), counters_, decide);
+    }
   }
   const TraceCounts& counts() const { return counts_; }
 
  private:
-  static constexpr uint32_t kRays = 4096;
-  std::vector<const std::byte*> pages_;
-  SceneTracer tracer_;
+  RayGroup group_;
   TraceCounters counters_;
   TraceCounts counts_;
-  Ray rays_[kRays];
-  uint32_t free_[kRays], free_count_ = [this] { for (uint32_t i = 0; i < kRays; ++i) free_[i] = i; return kRays; }();
 };
 
 /// Each ray to its end, in the order given or sorted first.
@@ -70,9 +54,9 @@ class DepthFirstOrder : public RayOrder {
     OrderRun result;
     result.seconds = run_together(threads_, [&](unsigned thread) {
       if (sorter_ != nullptr) sorter_->sort(set.rays, thread);
-      const auto tracer = std::make_unique<DepthFirstTracer>(scene_);
-      for (uint64_t first; (first = next.fetch_add(4096)) < set.rays.size();) {
-        trace_range(set, first, std::min<uint64_t>(first + 4096, set.rays.size()), answers, *tracer);
+      const auto tracer = std::make_unique<DepthFirstTracer>();
+      for (uint64_t first; (first = next.fetch_add(kRaysPerGrab)) < set.rays.size();) {
+        trace_range(set, first, std::min<uint64_t>(first + kRaysPerGrab, set.rays.size()), answers, *tracer);
       }
       const std::lock_guard guard(mutex);
       result.counts.add(tracer->counts());
@@ -112,6 +96,7 @@ const char* name_of(MemoryOrder order) {
     case MemoryOrder::kDepthFirst: return "depth-first";
     case MemoryOrder::kSorted: return "sorted";
     case MemoryOrder::kQueued: return "queued";
+    case MemoryOrder::kHybrid: return "hybrid";
   }
   return "";
 }
@@ -131,6 +116,7 @@ void trace_to_end(const MemoryScene& scene, Ray& ray) {
 std::unique_ptr<RayOrder> make_order(MemoryOrder order, const MemoryScene& scene, const OrderOptions& options,
                                      uint64_t ray_count) {
   if (order == MemoryOrder::kQueued) return make_queued_order(scene, options, ray_count);
+  if (order == MemoryOrder::kHybrid) return make_hybrid_order(scene, options.threads);
   std::unique_ptr<TeamSorter> sorter;
   if (order == MemoryOrder::kSorted) {
     sorter = std::make_unique<TeamSorter>(scene.top_tree().bounds(), options.threads, ray_count);
@@ -138,36 +124,54 @@ std::unique_ptr<RayOrder> make_order(MemoryOrder order, const MemoryScene& scene
   return std::make_unique<DepthFirstOrder>(scene, options.threads, std::move(sorter));
 }
 
-double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsigned threads, bool cpu_time) {
-  const uint64_t group_count = set.rays.size() / kGroupRays;
-  const uint64_t sampled = std::min(group_count, kMaxGroups);
+/// `trace(thread, first)` traces the group that begins with that ray.
+template <class Trace>
+double second_pass_rays_per_second(uint64_t rays, uint64_t group_rays, unsigned threads, bool cpu_time,
+                                   const Trace& trace) {
+  const uint64_t group_count = rays / group_rays;
+  const uint64_t sampled = std::min(group_count, kMaxBoundRays / group_rays);
   if (sampled == 0) return 0;
   std::vector<double> seconds(threads);
   run_together(threads, [&](unsigned thread) {
-    const auto tracer = std::make_unique<DepthFirstTracer>(scene);
-    float kept = 0;  // so that no pass is left out
-    const auto trace_group = [&](uint64_t group) {
-      uint64_t i = group * kGroupRays;
+    const auto clock = cpu_time ? thread_cpu_seconds : now_seconds;
+    const auto group = trace();
+    for (uint64_t i = thread; i < sampled; i += threads) {
+      const uint64_t first = i * group_count / sampled * group_rays;
+      group(first);
+      const double start = clock();
+      group(first);
+      seconds[thread] += clock() - start;
+    }
+  });
+  return static_cast<double>(sampled * group_rays) / *std::max_element(seconds.begin(), seconds.end());
+}
+
+double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsigned threads, bool cpu_time) {
+  LargeVector<RayAnswer> answers(set.rays.size());  // kept, so that no pass is left out
+  const auto single = [&] {
+    return [&, tracer = std::make_shared<DepthFirstTracer>()](uint64_t first) {
+      uint64_t i = first;
       const auto more = [&](Ray& ray) {
-        if (i == (group + 1) * kGroupRays) return false;
+        if (i == first + kGroupRays) return false;
         ray = begin_ray(set.rays[i], static_cast<uint32_t>(i), set.any_hit);
         ++i;
         return true;
       };
-      tracer->trace(scene, more, [&](const Ray& ray) { kept += answer_of(ray).t; });
+      tracer->trace(scene, more, [&](const Ray& ray) { answers[ray.path & ~Ray::kAnyHitBit] = answer_of(ray); });
     };
-    const auto clock = cpu_time ? thread_cpu_seconds : now_seconds;
-    for (uint64_t i = thread; i < sampled; i += threads) {
-      const uint64_t group = i * group_count / sampled;
-      trace_group(group);
-      const double start = clock();
-      trace_group(group);
-      seconds[thread] += clock() - start;
-    }
-    volatile float sink = kept;
-    (void)sink;
-  });
-  return static_cast<double>(sampled * kGroupRays) / *std::max_element(seconds.begin(), seconds.end());
+  };
+  const auto hybrid = [&] {
+    return [&, tracer = std::make_shared<HybridTracer>(scene)](uint64_t first) {
+      uint64_t begin = first;
+      const std::function<RayRange()> grab = [&] {
+        return RayRange{std::exchange(begin, first + kHybridGroupRays), first + kHybridGroupRays};
+      };
+      tracer->trace(set, grab, answers);
+    };
+  };
+  const uint64_t rays = set.rays.size();
+  return std::max(second_pass_rays_per_second(rays, kGroupRays, threads, cpu_time, single),
+                  second_pass_rays_per_second(rays, kHybridGroupRays, threads, cpu_time, hybrid));
 }
 
 }  // namespace shoal::bench

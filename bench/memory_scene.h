@@ -19,11 +19,6 @@ struct MemoryScene {
   uint64_t geometry_bytes = 0;
 
   const TopTree& top_tree() const { return scene.top_tree; }
-  std::vector<const std::byte*> page_table() const {
-    std::vector<const std::byte*> table;
-    for (const auto& page : pages) table.push_back(page.data());
-    return table;
-  }
 };
 
 /// Coverage is taken out: every triangle is opaque, as it is for programs that know no alpha.

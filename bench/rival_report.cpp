@@ -12,7 +12,7 @@ double per(uint64_t count, uint64_t of) {
 }
 
 /// Keys in JSON.
-constexpr const char* kOrderKeys[kOrderCount] = {"depth_first", "sorted", "queued"};
+constexpr const char* kOrderKeys[kOrderCount] = {"depth_first", "sorted", "queued", "hybrid"};
 
 std::string rate_columns(std::initializer_list<double> rates) {
   std::string line = " |";
@@ -37,10 +37,10 @@ void print_scene(const RivalScene& scene) {
 }
 
 void print_header() {
-  fmt::print("{:<44} | {:^23} | {:^39} |\n", "", "Shoal", "Embree");
+  fmt::print("{:<44} | {:^31} | {:^39} |\n", "", "Shoal", "Embree");
   fmt::print("{:<12} {:>2} {:>8} {:>5} {:<11}", "workload", "th", "rays", "hit", "best order");
-  fmt::print("  | {:>7} {:>7} {:>7} | {:>7} {:>7} {:>7} {:>7} {:>7} | {:>7} |", "depth", "sorted", "queued", "default",
-             "compact", "packet", "stream", "sorted", "bound");
+  fmt::print("  | {:>7} {:>7} {:>7} {:>7} | {:>7} {:>7} {:>7} {:>7} {:>7} | {:>7} |", "depth", "sorted", "queued",
+             "hybrid", "default", "compact", "packet", "stream", "sorted", "bound");
   fmt::print(" {:>7} {:>7} | {:>6} {:>5}\n", "/Embree", "/bound", "differ", "CPU");
   std::fflush(stdout);
 }
@@ -48,7 +48,7 @@ void print_header() {
 void print_row(const RivalRow& row) {
   fmt::print("{:<12} {:>2} {:>8} {:>5.3f} {:<11} ", row.workload, row.threads, row.rays, per(row.hits, row.rays),
              name_of(kOrders[row.best_order()]));
-  fmt::print("{}{}{} |", rate_columns({row.shoal[0], row.shoal[1], row.shoal[2]}),
+  fmt::print("{}{}{} |", rate_columns({row.shoal[0], row.shoal[1], row.shoal[2], row.shoal[3]}),
              rate_columns({row.embree_default, row.embree_compact, row.embree_packet, row.embree_stream,
                            row.embree_sorted}),
              rate_columns({row.bound}));

@@ -299,7 +299,7 @@ class TouchingTracer {
       const LeafView leaf = lane.leaf();
       touch_leaf(leaf);
       lane.job->triangle_tests += leaf.triangle_count;
-      lane.candidates = find_candidates(*lane.space, leaf);
+      lane.candidates = find_candidates(*lane.space, leaf, lane.job->ray->t);
     }
     for (uint32_t i = 0; i < list.size; ++i) {
       if (lanes_[list.lanes[i]].candidates != 0) test_candidates(lanes_[list.lanes[i]]);

@@ -152,7 +152,8 @@ const std::map<std::string, Order>& order_choices() {
   static const std::map<std::string, Order> kOrders{{"auto", Order::kAuto},
                                                      {"queued", Order::kQueued},
                                                      {"depth-first", Order::kDepthFirst},
-                                                     {"sorted", Order::kSorted}};
+                                                     {"sorted", Order::kSorted},
+                                                     {"hybrid", Order::kHybrid}};
   return kOrders;
 }
 

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "engine/film.h"
+#include "engine/hybrid_paths.h"
 #include "engine/path_ray.h"
 #include "engine/preview.h"
 #include "engine/process_memory.h"
@@ -99,7 +100,7 @@ unsigned read_depth_within(const PageFile& file, const PagingOptions& asked, uin
 uint64_t waiting_bytes(Order order, uint32_t treelet_count, uint32_t paths, unsigned threads) {
   const uint64_t queued = QueuedPaths::bytes(treelet_count, paths, threads);
   const uint64_t sorted = SortedPaths::bytes(paths, threads);
-  if (order == Order::kAuto) return std::max(queued, sorted);
+  if (order == Order::kAuto) return std::max({queued, sorted, HybridPaths::bytes(treelet_count, threads)});
   return order == Order::kSorted ? sorted : queued;
 }
 
@@ -107,7 +108,7 @@ uint64_t waiting_bytes(Order order, uint32_t treelet_count, uint32_t paths, unsi
 Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const PictureOptions& picture,
                              const ExecutionOptions& execution) {
   const bool queued = order == Order::kQueued || order == Order::kAuto;
-  const bool waits = order != Order::kDepthFirst;
+  const bool waits = order != Order::kDepthFirst && order != Order::kHybrid;
   const unsigned threads = execution.threads > 0 ? execution.threads : std::max(1u, std::thread::hardware_concurrency());
   const uint64_t samples = uint64_t{picture.width} * picture.height * picture.samples;
   MemoryPlan plan = fixed_parts(scene, picture, execution, threads);
@@ -123,7 +124,16 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
   uint64_t asked_paths = std::min<uint64_t>((execution.rays_in_flight + 1) / 2, kMaxPathsInFlight);
   if (execution.rays_in_flight > 0) asked_paths = std::max<uint64_t>(asked_paths, kRaysPerBlock / 2);
   const uint64_t least_paths = asked_paths > 0 ? asked_paths : std::min<uint64_t>(kMinimumPaths, samples);
-  const uint64_t least_pages = std::max(least_cache, execution.page_cache_bytes);
+  uint64_t least_pages = std::max(least_cache, execution.page_cache_bytes);
+  if (order == Order::kHybrid) {
+    least_pages = plan.scene_page_bytes();
+    plan.ray_bytes = HybridPaths::bytes(scene.treelet_count, threads);
+    if (execution.page_cache_bytes > 0 && execution.page_cache_bytes < least_pages) {
+      return Error{ErrorCode::kMemoryCap,
+                   fmt::format("a page cache of {} bytes cannot hold every page, as the hybrid order needs; the smallest "
+                               "that works is {} bytes", execution.page_cache_bytes, least_pages)};
+    }
+  }
 
   const uint64_t fixed = plan.total_bytes();
   const uint64_t reading = plan.process_bytes + plan.top_tree_bytes + plan.table_bytes + scene.reading_bytes;
@@ -133,7 +143,7 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
                  fmt::format("the memory cap of {} cannot work for this scene and picture; the smallest that would is "
                              "about {}", in_mib(plan.cap_bytes), in_mib(smallest + kMiB))};
   }
-  uint64_t left = plan.cap_bytes - fixed;
+  uint64_t left = plan.cap_bytes - (fixed - plan.paths_bytes());
   if (queued) {
     const uint64_t room = std::min(left / kReadAheadShare, plan.cap_bytes - smallest);
     plan.read_depth = read_depth_within(scene.file, execution.paging, room);
@@ -147,6 +157,7 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
                                     std::min<uint64_t>(samples, kMaxPathsInFlight), paths_bytes});
   }
   plan.paths_in_flight = static_cast<uint32_t>(waits ? paths : threads);
+  if (order == Order::kHybrid) plan.paths_in_flight = threads * HybridPaths::kPaths;
   if (waits) {
     plan.path_state_bytes = order == Order::kSorted
                                 ? SortedPaths::state_bytes(plan.paths_in_flight)

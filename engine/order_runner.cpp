@@ -52,7 +52,7 @@ ChosenOrder OrderRunner::run(RenderContext& context) {
 OrderTrial OrderRunner::try_order(RenderContext& context, Order order) {
   const auto tests = [&] {
     const RayCounters rays = context.counters.total();
-    return rays.node_tests_count + rays.triangle_tests_count;
+    return rays.rays_traced_count + rays.triangle_tests_count;
   };
   OrderTrial trial{order};
   const uint64_t tests_before = tests();
@@ -71,6 +71,8 @@ void OrderRunner::run_order(RenderContext& context, Order order) {
   } else if (order == Order::kSorted) {
     SortedPaths paths(scene_.top_tree.bounds(), plan_.paths_in_flight, context.threads);
     render_sorted(context, paths);
+  } else if (order == Order::kHybrid) {
+    render_hybrid(context);
   } else {
     render_depth_first(context);
   }

@@ -77,6 +77,7 @@ std::string_view order_name(Order order) {
     case Order::kQueued: return "queued";
     case Order::kDepthFirst: return "depth-first";
     case Order::kSorted: return "sorted";
+    case Order::kHybrid: return "hybrid";
   }
   return "";
 }

@@ -31,7 +31,7 @@ struct PictureOptions {
   ShadingOptions shading;
 };
 
-enum class Order : uint8_t { kAuto, kQueued, kDepthFirst, kSorted };
+enum class Order : uint8_t { kAuto, kQueued, kDepthFirst, kSorted, kHybrid };
 
 std::string_view order_name(Order order);
 

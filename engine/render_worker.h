@@ -126,6 +126,7 @@ class RenderWorker {
     return counters_.rays[static_cast<size_t>(kind_of(ray))][counted_bounce_of(ray)];
   }
   RenderCounters& counters() { return counters_; }
+  TraceCounters& trace_counters() { return trace_counters_; }
   CacheCounters& cache_counters() { return cache_counters_; }
   /// Shows the preview and calls the progress hook now and then, unless another thread is at it; sees stop requests.
   void report_progress();
@@ -153,6 +154,8 @@ void add_cache_counters(const CacheCounters& cache, RenderCounters& counters);
 /// The orders. Each returns when every sample is in the film or context.ended is set.
 void render_depth_first(RenderContext& context);
 void render_sorted(RenderContext& context, SortedPaths& paths);
+/// Requires: a cache with room for every page.
+void render_hybrid(RenderContext& context);
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches);
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.

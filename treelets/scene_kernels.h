@@ -41,6 +41,7 @@ RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, Tra
 struct LaneTracer {
   LaneTracer();
   ~LaneTracer();
+  static uint64_t bytes();
   /// Starts `most` rays of the stream, fewer if it ends, and traces them. Returns how many.
   uint64_t trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
 
@@ -57,6 +58,7 @@ struct PacketUse {
 struct PacketTracer {
   PacketTracer();
   ~PacketTracer();
+  static uint64_t bytes();
   /// Whether this processor has a kernel for packets.
   static bool available();
   /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait for

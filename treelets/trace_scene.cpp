@@ -67,6 +67,8 @@ SceneTracer::SceneTracer(const TopTree& tree, PageTable pages, RayGrouping group
 
 SceneTracer::~SceneTracer() = default;
 
+uint64_t SceneTracer::bytes() { return sizeof(SceneTracer) + LaneTracer::bytes() + PacketTracer::bytes(); }
+
 /// Packets need all rays in one space.
 bool SceneTracer::use_packets() const {
   return grouping_ != RayGrouping::kSingle && PacketTracer::available() && tree_.single_identity();

@@ -51,6 +51,8 @@ class SceneTracer {
   /// Keeps a reference to the tree and the table.
   SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping = RayGrouping::kAuto);
   ~SceneTracer();
+  /// Of a tracer.
+  static uint64_t bytes();
   /// Until the stream has no ray left and none is under way.
   void trace(RayStream& stream, TraceCounters& counters);
 

@@ -336,6 +336,7 @@ HWY_EXPORT(trace_lanes);
 
 LaneTracer::LaneTracer() : lanes(std::make_unique<SceneLanes>()) {}
 LaneTracer::~LaneTracer() = default;
+uint64_t LaneTracer::bytes() { return sizeof(LaneTracer) + sizeof(SceneLanes); }
 
 uint64_t LaneTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters) {
   return HWY_DYNAMIC_DISPATCH(trace_lanes)(tables, *lanes, most, stream, counters);

@@ -577,6 +577,7 @@ HWY_EXPORT(trace_packets);
 
 PacketTracer::PacketTracer() : state(std::make_unique<PacketState>()) {}
 PacketTracer::~PacketTracer() = default;
+uint64_t PacketTracer::bytes() { return sizeof(PacketTracer) + sizeof(PacketState); }
 
 bool PacketTracer::available() { return HWY_DYNAMIC_DISPATCH(has_packets)(); }
 

@@ -73,7 +73,7 @@ TEST(Output, APictureThatWasThereStaysWhenARenderFails) {
 TEST(Output, APreviewEndsAsTheFinishedPicture) {
   const TemporaryFolder folder;
   make_terrain(folder, "1K");
-  for (const char* order : {"queued", "depth-first", "sorted", "auto"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "auto"}) {
     expect_exit(run_shoal(folder, render(folder, {"-o", folder / "out.exr", "--png", folder / "out.png", "--preview",
                                                   folder / "preview.png", "--stats", folder / "out.json", "--exposure",
                                                   "1.5", "--order", order})),
@@ -97,7 +97,7 @@ TEST(Output, APreviewEndsAsTheFinishedPicture) {
 TEST(Output, APreviewStaysWhenARenderIsStopped) {
   const TemporaryFolder folder;
   make_terrain(folder, "1K");
-  for (const char* order : {"queued", "depth-first", "sorted", "auto"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "auto"}) {
     Program program(folder, {SHOAL_BINARY, "render", folder / "terrain.shoal", "-o", folder / "out.exr", "--preview",
                              folder / "preview.png", "--width", "512", "--height", "512", "--spp", "100000",
                              "--quiet", "--order", order});
@@ -118,7 +118,7 @@ TEST(Output, APreviewStaysWhenARenderIsStopped) {
 TEST(Output, SignalsStopARenderWithCodeNineAndNoFile) {
   const TemporaryFolder folder;
   make_terrain(folder, "1K");
-  for (const char* order : {"queued", "depth-first", "sorted", "auto"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "auto"}) {
     for (const int signal : {SIGTERM, SIGINT}) {
       Program program(folder, {SHOAL_BINARY, "render", folder / "terrain.shoal", "-o", folder / "out.exr", "--png",
                                folder / "out.png", "--width", "512", "--height", "512", "--spp", "100000",

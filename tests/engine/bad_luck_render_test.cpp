@@ -27,6 +27,8 @@ const Way kWays[] = {{"depth-first", Order::kDepthFirst, 1, 0},
                      {"depth-first, two threads", Order::kDepthFirst, 2, 0},
                      {"sorted", Order::kSorted, 1, 0},
                      {"sorted, two threads", Order::kSorted, 2, 0},
+                     {"hybrid", Order::kHybrid, 1, 0},
+                     {"hybrid, two threads", Order::kHybrid, 2, 0},
                      {"queued", Order::kQueued, 1, 0},
                      {"queued, reading ahead", Order::kQueued, 2, 8},
                      {"depth-first, two threads, with a preview", Order::kDepthFirst, 2, 0, true},
@@ -53,7 +55,9 @@ class BadLuckRender : public ::testing::Test {
     execution.threads = way.threads;
     execution.rays_in_flight = 64;
     execution.paging.read_depth = way.read_depth;
-    execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.file, way.threads);
+    if (way.order != Order::kHybrid) {
+      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.file, way.threads);
+    }
     opening_calls_ = fs_.calls();
     if (way.preview) execution.preview.path = "preview.png";
     MemoryFileSystem previews;
@@ -131,7 +135,7 @@ TEST_F(BadLuckRender, AStopIsHeardWhereCameraRaysSeeNothing) {
   CameraRecord camera = frame_camera(scene.value().top_tree.bounds());
   camera.camera_to_world.translation = camera.camera_to_world.translation + Vec3{1e6f, 0, 0};
   scene.value().cameras = {camera};
-  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kAuto}) {
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kHybrid, Order::kAuto}) {
     PictureOptions picture;
     picture.width = picture.height = 256;
     picture.samples = 1u << 16;  // minutes, were it not stopped

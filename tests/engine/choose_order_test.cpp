@@ -18,7 +18,7 @@ MemoryPlan plan_with(uint64_t cache_bytes, uint32_t paths) {
 }
 
 TEST(ChooseOrder, TakesWhatWasAskedFor) {
-  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted}) {
+  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kHybrid}) {
     const FirstChoice choice = choose_before_trials(order, plan_with(1000, 1), 1ull << 40);
     EXPECT_EQ(choice.chosen.order, order);
     EXPECT_FALSE(choice.to_be_tried);
@@ -45,6 +45,10 @@ TEST(ChooseOrder, TriesNothingInAShortRender) {
   const MemoryPlan plan = plan_with(1000, 1u << 19);
   EXPECT_EQ(trial_samples(plan), 1u << 20);
   EXPECT_FALSE(choose_before_trials(Order::kAuto, plan, (1u << 24) - 1).to_be_tried);
+  EXPECT_EQ(choose_before_trials(Order::kAuto, plan, (1u << 24) - 1).chosen.order, Order::kHybrid);
+  MemoryPlan large = plan;
+  large.geometry_page_bytes = large.cache_bytes = 1u << 30;
+  EXPECT_EQ(choose_before_trials(Order::kAuto, large, (1u << 24) - 1).chosen.order, Order::kQueued);
   EXPECT_TRUE(choose_before_trials(Order::kAuto, plan, 1u << 24).to_be_tried);
   EXPECT_FALSE(choose_before_trials(Order::kAuto, plan_with(1000, 32), 1u << 19).to_be_tried)
       << "few paths in flight do not make short trials say anything";

@@ -58,6 +58,10 @@ const Variation kVariations[] = {
      .smallest_cache = true, .preview = true},
     {.name = "with a preview, one thread, full", .threads = 1, .rays_in_flight = 20000, .policy = "full",
      .queue_capacity = 100, .preview = true},
+    {.name = "hybrid", .order = Order::kHybrid},
+    {.name = "hybrid, one thread", .order = Order::kHybrid, .threads = 1},
+    {.name = "hybrid, treelets of 4 KiB, with a preview", .treelet_bytes = 4u << 10, .order = Order::kHybrid,
+     .threads = 3, .preview = true},
     {.name = "sorted", .order = Order::kSorted},
     {.name = "sorted, waves of 32 paths", .order = Order::kSorted, .threads = 1, .rays_in_flight = 64},
     {.name = "sorted, more threads than processors", .order = Order::kSorted, .threads = 3, .rays_in_flight = 5000},
@@ -227,9 +231,19 @@ TEST_F(RenderOrders, CountEveryRayOfAScene) {
   for (const RayCounters& total : totals) {
     EXPECT_EQ(total.rays_traced_count, totals[0].rays_traced_count);
     EXPECT_EQ(total.ray_hits_count, totals[0].ray_hits_count);
-    EXPECT_EQ(total.node_tests_count, totals[0].node_tests_count) << "trials count on it";
+    EXPECT_EQ(total.node_tests_count, totals[0].node_tests_count);
     EXPECT_EQ(total.triangle_tests_count, totals[0].triangle_tests_count) << "trials count on it";
   }
+  ExecutionOptions execution;
+  execution.order = Order::kHybrid;
+  const auto result = render(posix_file_system(), scene.value(), picture, execution);
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  const RayCounters hybrid = result.value().counters.total();
+  EXPECT_EQ(hybrid.rays_traced_count, totals[0].rays_traced_count);
+  EXPECT_EQ(hybrid.ray_hits_count, totals[0].ray_hits_count);
+  EXPECT_LT(hybrid.node_tests_count, totals[0].node_tests_count) << "no node is met twice";
+  EXPECT_NEAR(static_cast<double>(hybrid.triangle_tests_count) / static_cast<double>(totals[0].triangle_tests_count), 1,
+              0.2) << "trials count on it";
   EXPECT_GT(totals[0].rays_queued_count, totals[0].rays_traced_count / 2);
   EXPECT_EQ(totals[1].rays_queued_count, 0u);
   EXPECT_EQ(totals[2].rays_queued_count, 0u);
