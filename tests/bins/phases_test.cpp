@@ -72,7 +72,7 @@ TEST(Phases, SumToTheTimeOfAllThreadsWithAPreviewAndLittleMemory) {
   make_terrain(folder);
   const ProgramRun run = run_shoal(
       folder, join({"render", folder / "terrain.shoal", "-o", folder / "out.exr", "--preview", folder / "out.png",
-                    "--stats", folder / "out.json", "--page-cache", "2M", "--rays-in-flight", "64", "--threads", "2"},
+                    "--stats", folder / "out.json", "--page-cache", "2M", "--rays-in-flight", "64", "--threads", "2", "--order", "queued"},
                    tiny_picture()));
   expect_exit(run, 0);
   const json stats = json::parse(file_text(folder / "out.json"));
