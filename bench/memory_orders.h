@@ -94,8 +94,8 @@ void trace_to_end(const MemoryScene& scene, Ray& ray);
 /// How fast these rays could go if everything they touch were in the core's own caches: rays a second of the second
 /// pass over groups of consecutive rays, each group traced twice in a row: 64 rays depth-first, or 1024 by the hybrid
 /// order's kernels, whichever is faster. Assumes that a group's nodes and leaves fit in L1 and L2; flatters a little,
-/// since the branch predictors, too, have seen the group once. Groups are spread evenly over the rays. By CPU time where
-/// `cpu_time`.
+/// since the branch predictors, too, have seen the group once. Groups are spread evenly over the rays. By CPU time
+/// where `cpu_time`.
 double bound_rays_per_second(const MemoryScene& scene, const RaySet& set, unsigned threads, bool cpu_time);
 
 }  // namespace shoal::bench

@@ -32,7 +32,9 @@ FirstChoice choose_before_trials(Order asked, const MemoryPlan& plan, uint64_t s
   if (plan.cache_bytes < plan.scene_page_bytes()) return {{Order::kQueued, "the page cache cannot hold every page"}};
   if (!plan.every_order_fits) return {{Order::kQueued, "too little memory to try others"}};
   if (samples / kTrialsARender >= trial_samples(plan)) return {{Order::kQueued, "loads the pages"}, true};
-  if (plan.scene_page_bytes() <= kSmallSceneBytes) return {{Order::kHybrid, "a small scene, too few samples to try others"}};
+  if (plan.scene_page_bytes() <= kSmallSceneBytes) {
+    return {{Order::kHybrid, "a small scene, too few samples to try others"}};
+  }
   return {{Order::kQueued, "too few samples to try others"}};
 }
 

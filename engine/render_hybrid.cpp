@@ -54,8 +54,8 @@ class HybridWorker final : public RayStream {
   }
 
  private:
-  /// The next rays of what came home, and of new paths; false when there are none: for now, or, with none under way, for
-  /// good.
+  /// The next rays of what came home, and of new paths; false when there are none: for now, or, with none under way,
+  /// for good.
   bool make_rays() {
     paths_.ready.clear();
     paths_.next_ready = 0;

@@ -51,8 +51,10 @@ HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float 
   // Edge functions of c b, a c, b a.
   HWY_ALIGN static constexpr int32_t kCab[4] = {2, 0, 1, 3}, kBca[4] = {1, 2, 0, 3};
   const auto cab = hn::SetTableIndices(f, kCab), bca = hn::SetTableIndices(f, kBca);
-  const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(x, cab)), from_y = hn::PromoteTo(d, hn::TableLookupLanes(y, cab));
-  const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(x, bca)), to_y = hn::PromoteTo(d, hn::TableLookupLanes(y, bca));
+  const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(x, cab));
+  const auto from_y = hn::PromoteTo(d, hn::TableLookupLanes(y, cab));
+  const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(x, bca));
+  const auto to_y = hn::PromoteTo(d, hn::TableLookupLanes(y, bca));
   const auto edge = hn::Sub(hn::Mul(from_x, to_y), hn::Mul(from_y, to_x));
   const auto corner = hn::FirstN(d, 3);
   const auto none = hn::Zero(d);

@@ -88,7 +88,8 @@ class PacketLeaves {
       }
       uint32_t left = rays & ~bits_of(hn::And(positive, negative));
       if (left == 0) continue;
-      const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse), c = hn::Mul(corner[2].z, inverse);
+      const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse),
+                 c = hn::Mul(corner[2].z, inverse);
       const auto t = hn::Load(f, packet.t);
       left &= ~bits_of(hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), hn::MulAdd(t, hn::Set(f, kReachScale), pads)),
                               hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(pads))));
@@ -140,7 +141,9 @@ class PacketLeaves {
     HWY_ALIGN float t_plane[kLanes];
     uint32_t crossed = 0;
     for (uint32_t part = 0; part < 2; ++part) {
-      const auto half = [&](V16 x) HWY_ATTR { return hn::PromoteTo(d, part != 0 ? hn::UpperHalf(h, x) : hn::LowerHalf(h, x)); };
+      const auto half = [&](V16 x) HWY_ATTR {
+        return hn::PromoteTo(d, part != 0 ? hn::UpperHalf(h, x) : hn::LowerHalf(h, x));
+      };
       const auto ax = half(corner[0].x), ay = half(corner[0].y), bx = half(corner[1].x), by = half(corner[1].y),
                  cx = half(corner[2].x), cy = half(corner[2].y);
       const auto eu = hn::Sub(hn::Mul(cx, by), hn::Mul(cy, bx)), ev = hn::Sub(hn::Mul(ax, cy), hn::Mul(ay, cx)),
@@ -164,10 +167,12 @@ class PacketLeaves {
     auto t_near = hn::Zero(f), t_far = hn::Set(f, std::numeric_limits<float>::infinity());
     for (int axis = 0; axis < 3; ++axis) {
       const float* c = raw[axis];
-      const float least = std::min(std::min(c[v[0]], c[v[1]]), c[v[2]]), most = std::max(std::max(c[v[0]], c[v[1]]), c[v[2]]);
+      const float least = std::min(std::min(c[v[0]], c[v[1]]), c[v[2]]);
+      const float most = std::max(std::max(c[v[0]], c[v[1]]), c[v[2]]);
       const auto origin = hn::Load(f, packet.origin[axis]), inverse = hn::Load(f, packet.inverse[axis]),
                  far_inverse = hn::Load(f, packet.far_inverse[axis]);
-      const auto lo = hn::Sub(hn::Set(f, least), hn::Add(origin, pad)), hi = hn::Sub(hn::Set(f, most), hn::Sub(origin, pad));
+      const auto lo = hn::Sub(hn::Set(f, least), hn::Add(origin, pad));
+      const auto hi = hn::Sub(hn::Set(f, most), hn::Sub(origin, pad));
       t_near = hn::Max(t_near, hn::Min(hn::Mul(lo, inverse), hn::Mul(hi, inverse)));
       t_far = hn::Min(t_far, hn::Max(hn::Mul(lo, far_inverse), hn::Mul(hi, far_inverse)));
     }

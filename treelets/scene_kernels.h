@@ -61,8 +61,8 @@ struct PacketTracer {
   static uint64_t bytes();
   /// Whether this processor has a kernel for packets.
   static bool available();
-  /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait for
-  /// the next call, or for next_waiting().
+  /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait
+  /// for the next call, or for next_waiting().
   PacketUse trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
   /// Takes a ray back that waits for a packet; nullptr: none does.
   Ray* next_waiting();

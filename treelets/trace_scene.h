@@ -1,11 +1,11 @@
 // Rays through a scene whose treelets are all in memory, each from its start to its end: one stack leads through the
 // top tree and the treelets, so that a ray never looks for its place in the top tree again. For orders that hold every
 // page; where pages come and go, TopTree::next and trace_treelets. Answers are the same to the bit.
-// Called by engine/render_depth_first and bench/against_embree.
+// Called by engine/render_hybrid and bench/against_embree.
 //
-// Two ways, chosen by what the last rays did (docs/decisions/0018): packets, which test a box for 16 rays at once, while
-// enough rays enter the same nodes (camera rays, shadow rays, bounces in small scenes), else rays by themselves, several
-// in turn.
+// Two ways, chosen by what the last rays did (docs/decisions/0018): packets, which test a box for 16 rays at once,
+// while enough rays enter the same nodes (camera rays, shadow rays, bounces in small scenes), else rays by themselves,
+// several in turn.
 //
 // Properties and assumptions
 //   order      rays end in any order and do not affect each other.

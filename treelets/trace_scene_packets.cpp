@@ -89,7 +89,9 @@ class PacketRun : private PacketLeaves {
     }
     const Vec3& first = packet.rays[0]->direction;
     for (int axis = 0; axis < 3; ++axis) packet.negative[axis] = std::signbit(first[axis]) ? 1 : 0;
-    packet.k[2] = longest_axis(first), packet.k[0] = packet.k[2] == 2 ? 0 : packet.k[2] + 1, packet.k[1] = packet.k[0] == 2 ? 0 : packet.k[0] + 1;
+    packet.k[2] = longest_axis(first);
+    packet.k[0] = packet.k[2] == 2 ? 0 : packet.k[2] + 1;
+    packet.k[1] = packet.k[0] == 2 ? 0 : packet.k[0] + 1;
     const float extent = tables_.instances[0].max_abs_coordinate;
     const auto most_float = hn::Set(f, std::numeric_limits<float>::max());
     V16 origin[3], direction[3], inverse[3];
@@ -236,7 +238,8 @@ class PacketRun : private PacketLeaves {
     const auto far_x = hn::Load(f, packet.far_bias[0]), far_y = hn::Load(f, packet.far_bias[1]),
                far_z = hn::Load(f, packet.far_bias[2]);
     const auto t = hn::Load(f, packet.t), enlarge = hn::Set(f, kFarScale), zero = hn::Zero(f);
-    const float *near_0 = plane(packet.negative[0], 0), *near_1 = plane(packet.negative[1], 1), *near_2 = plane(packet.negative[2], 2);
+    const float *near_0 = plane(packet.negative[0], 0), *near_1 = plane(packet.negative[1], 1),
+                *near_2 = plane(packet.negative[2], 2);
     const float *far_0 = plane(packet.negative[0] ^ 1, 0), *far_1 = plane(packet.negative[1] ^ 1, 1),
                 *far_2 = plane(packet.negative[2] ^ 1, 2);
     HWY_ALIGN float near[8][kLanes];
