@@ -9,12 +9,12 @@ namespace {
 
 /// Below that a trial is too short to say anything: a tenth of a second or so.
 constexpr uint64_t kLeastTrialSamples = 1u << 16;
-/// A render has so many trials' samples at least: so the orders that lose take at most an eighth of it.
+/// A render has so many trials' samples at least: so the orders that lose take at most three sixteenths of it.
 constexpr uint64_t kTrialsARender = 16;
 /// An order that is tried must take so much less time than the queued one: trials are that uncertain.
 constexpr double kWorthChanging = 0.95;
-/// Pages so small are read in a blink, whoever asks for them; where they are in memory the hybrid order was the fastest
-/// in every measurement (docs/decisions/0018). Larger scenes begin with the order that reads ahead.
+/// Pages so small are read in a blink, whoever asks for them, and then the hybrid order is the fastest in scenes of that
+/// size (docs/decisions/0018). Larger scenes begin with the order that reads ahead.
 constexpr uint64_t kSmallSceneBytes = 256ull << 20;
 
 double nanoseconds_a_test(const OrderTrial& trial) {

@@ -1,5 +1,5 @@
 // Hybrid: rays in packets of 16 while they agree, one by one where they do not (treelets/trace_scene), everything in
-// memory. A thread has some hundred paths under way; of those that are home it makes the next rays all at once, so that
+// memory. A thread has 1024 paths under way; of those that are home it makes the next rays all at once, so that
 // rays of a kind follow each other. Where the cache cannot hold every page another order renders (engine/choose_order,
 // engine/memory_plan).
 #include <chrono>
@@ -11,9 +11,9 @@
 namespace shoal {
 namespace {
 
-/// Samples are taken in such numbers, so that threads end together.
+/// A quarter of the paths, so that packets fill; few enough that threads end at about the same time.
 constexpr uint64_t kSamplesPerGrab = HybridPaths::kPaths / 4;
-/// While other threads complete the first lattice of a preview.
+/// Sleep between looks while other threads complete the first lattice of a preview.
 constexpr std::chrono::microseconds kFirstLatticeWait{200};
 
 class HybridWorker final : public RayStream {
@@ -60,7 +60,7 @@ class HybridWorker final : public RayStream {
     paths_.ready.clear();
     paths_.next_ready = 0;
     while (!context_.ended.load(std::memory_order_relaxed)) {
-      finish_rays();
+      take_home();
       while (paths_.free.size() >= kSamplesPerGrab && begin_paths()) {
       }
       worker_.report_progress();
@@ -74,7 +74,7 @@ class HybridWorker final : public RayStream {
     return !paths_.ready.empty();
   }
 
-  void finish_rays() {
+  void take_home() {
     worker_.enter(Phase::kPaths);
     uint32_t kept = 0;
     for (const uint32_t index : paths_.home) {  // first those whose vertex is complete, for one run through shading
@@ -84,14 +84,14 @@ class HybridWorker final : public RayStream {
     paths_.home.resize(kept);
     for (const uint32_t path : paths_.home) {
       if (context_.ended.load(std::memory_order_relaxed)) break;
-      go_on(path);
+      shade_vertex(path);
     }
     worker_.let_go();
     paths_.home.clear();
   }
 
   /// Shades the path's vertex, if it has one; without a ray to follow the path is over.
-  void go_on(uint32_t path) {
+  void shade_vertex(uint32_t path) {
     PathState& state = paths_.states[path];
     Ray rays[2];
     uint32_t count = 0;

@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace shoal {
 namespace HWY_NAMESPACE {
 
-#if HWY_ARCH_X86 && HWY_MAX_BYTES >= 32
+#if HWY_ARCH_X86 && HWY_MAX_BYTES >= 32  // Lanes (lane_box.h) is __m128 there
 
 namespace hn = hwy::HWY_NAMESPACE;
 using F4 = hn::FixedTag<float, 4>;
@@ -49,8 +49,8 @@ HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float 
   const auto y = hn::Sub(hn::Sub(hn::Load(f, words[ray.ky]), hn::Set(f, ray.origin[ray.ky])),
                          hn::Mul(hn::Set(f, ray.shear_y), z));
   // Edge functions of c b, a c, b a.
-  HWY_ALIGN static constexpr int32_t kCab[4] = {2, 0, 1, 3}, kBca[4] = {1, 2, 0, 3};
-  const auto cab = hn::SetTableIndices(f, kCab), bca = hn::SetTableIndices(f, kBca);
+  HWY_ALIGN static constexpr int32_t kEdgeFrom[4] = {2, 0, 1, 3}, kEdgeTo[4] = {1, 2, 0, 3};
+  const auto cab = hn::SetTableIndices(f, kEdgeFrom), bca = hn::SetTableIndices(f, kEdgeTo);
   const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(x, cab));
   const auto from_y = hn::PromoteTo(d, hn::TableLookupLanes(y, cab));
   const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(x, bca));
@@ -80,6 +80,7 @@ HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float 
   return true;
 }
 
+/// intersect_triangle() of triangle `i`.
 HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max, TriangleHit& hit) {
   const uint32_t vertex[3] = {leaf.corner(0)[i], leaf.corner(1)[i], leaf.corner(2)[i]};
   const V4 corners[3] = {load_corners(leaf, 0, vertex), load_corners(leaf, 1, vertex), load_corners(leaf, 2, vertex)};

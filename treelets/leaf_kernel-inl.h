@@ -20,7 +20,7 @@ using F16 = hn::CappedTag<float, 16>;
 using I16 = hn::RebindToSigned<F16>;
 using V16 = hn::Vec<F16>;
 inline constexpr size_t kLeafLanes = hn::MaxLanes(F16());
-/// Room for the roundings of a product and a quotient.
+/// 16 u more than t: out_of_reach().
 inline constexpr float kReachScale = 1 + 0x1p-20f;
 
 struct ShearedLanes {
@@ -105,37 +105,43 @@ struct LeafCorners {
 };
 #endif
 
-/// Lanes whose triangle the exact test leaves out for where it begins and ends along RaySpace::kz: its own box
-/// (triangle_test.h) is entered behind `t` or left before the ray begins. The box has one pad and roundings of about
-/// u R, which are less than a pad: so two pads, and room for the roundings of the products.
-HWY_INLINE hn::Mask<F16> out_of_reach(const RaySpace& ray, const ShearedLanes corner[3], float t) {
+/// Lanes whose edge functions have certainly different signs, by the float arithmetic of triangle_test.h.
+HWY_INLINE hn::Mask<F16> edges_differ(const ShearedLanes corner[3]) {
   const F16 f;
-  const auto inverse = hn::Set(f, ray.inverse[ray.kz]);
-  const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse), c = hn::Mul(corner[2].z, inverse);
-  const float pads = 2 * ray.pad * std::abs(ray.inverse[ray.kz]);
-  return hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), hn::Set(f, t * kReachScale + pads)),
-                hn::Lt(hn::Max(hn::Max(a, b), c), hn::Set(f, -pads)));
+  auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
+  const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
+  for (int e = 0; e < 3; ++e) {
+    const auto product = hn::Mul(corner[from[e]].y, corner[to[e]].x);
+    const auto value = hn::MulSub(corner[from[e]].x, corner[to[e]].y, product);
+    const auto bound = hn::MulAdd(hn::Set(f, kEdgeError), hn::Abs(product), hn::Set(f, kEdgeUnderflow));
+    positive = hn::Or(positive, hn::Gt(value, bound));
+    negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
+  }
+  return hn::And(positive, negative);
 }
 
-/// The triangles of a leaf that the exact test may accept at or before `t`: all but those with edge functions of
-/// certainly different signs, by the float arithmetic of triangle_test.h, and those out of reach.
+/// Lanes whose triangle the exact test leaves out for where it begins and ends along RaySpace::kz: its own box
+/// (triangle_test.h) is entered behind `t` or left before the ray begins. `inverse`: RaySpace::inverse along kz; `pads`:
+/// two of RaySpace::pad, as t. The box has one pad, and roundings of about u R (ray_space.h), which are less than
+/// another; kReachScale has room for those of z, of the products and of t's own.
+HWY_INLINE hn::Mask<F16> out_of_reach(const ShearedLanes corner[3], V16 inverse, V16 pads, V16 t) {
+  const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse), c = hn::Mul(corner[2].z, inverse);
+  const auto last = hn::MulAdd(t, hn::Set(F16(), kReachScale), pads);
+  return hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), last), hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(pads)));
+}
+
+/// The triangles of a leaf that the exact test may accept at or before `t`.
 HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf, float t) {
   const F16 f;
   const LeafCorners corners(ray, leaf);
+  const float inverse = ray.inverse[ray.kz];
+  const auto pads = hn::Set(f, 2 * ray.pad * std::abs(inverse));
   uint32_t rejected = 0;
   for (size_t first = 0; first < leaf.triangle_count; first += kLeafLanes) {
     const ShearedLanes corner[3] = {corners.at(0, first), corners.at(1, first), corners.at(2, first)};
-    auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
-    const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
-    for (int e = 0; e < 3; ++e) {
-      const auto product = hn::Mul(corner[from[e]].y, corner[to[e]].x);
-      const auto value = hn::MulSub(corner[from[e]].x, corner[to[e]].y, product);
-      const auto bound = hn::MulAdd(hn::Set(f, kEdgeError), hn::Abs(product), hn::Set(f, kEdgeUnderflow));
-      positive = hn::Or(positive, hn::Gt(value, bound));
-      negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
-    }
     uint8_t bits[8] = {};
-    hn::StoreMaskBits(f, hn::Or(hn::And(positive, negative), out_of_reach(ray, corner, t)), bits);
+    hn::StoreMaskBits(f, hn::Or(edges_differ(corner), out_of_reach(corner, hn::Set(f, inverse), pads, hn::Set(f, t))),
+                      bits);
     rejected |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << first;
   }
   return ~rejected & ((1u << leaf.triangle_count) - 1);

@@ -1,5 +1,5 @@
-// One triangle of a leaf against one ray: the exact test, the order of hits and coverage. Shared by the scalar
-// traversal and the SIMD kernel, so that both accept the same hits to the bit.
+// One triangle of a leaf against one ray: the order of hits and coverage, shared by all kernels, so that they accept the
+// same hits to the bit; and the exact test for the scalar traversal.
 #pragma once
 
 #include <span>

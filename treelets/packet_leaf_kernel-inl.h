@@ -24,7 +24,7 @@ class PacketLeaves {
   static constexpr uint32_t kLanes = static_cast<uint32_t>(kLeafLanes);
   static constexpr uint32_t kRawVertices = kMaxLeafVertices + 16;
   /// A leaf that so few rays enter is tested ray by ray.
-  static constexpr uint32_t kRaysApart = 5;
+  static constexpr uint32_t kMostRaysApart = 5;
 
   explicit PacketLeaves(TraceCounters& counters) : counters_(counters) {}
 
@@ -51,7 +51,7 @@ class PacketLeaves {
     const F16 f;
     const LeafView leaf(packet.leaves + size_t{4} * leaf_offset(ref));
     count(packet.triangle_tests, rays, leaf.triangle_count);
-    if (static_cast<uint32_t>(std::popcount(rays)) <= kRaysApart) return cross_leaf_apart(packet, leaf, ref, rays);
+    if (static_cast<uint32_t>(std::popcount(rays)) <= kMostRaysApart) return cross_leaf_apart(packet, leaf, ref, rays);
     HWY_ALIGN float raw[3][kRawVertices];
     for (size_t first = 0; first < leaf.vertex_count; first += kLeafLanes) {
       hn::StoreU(load_vertices(leaf, packet.k[0], first), f, raw[0] + first);
@@ -77,22 +77,9 @@ class PacketLeaves {
       for (int k = 0; k < 3; ++k) {
         corner[k] = {hn::Load(f, sheared[0][v[k]]), hn::Load(f, sheared[1][v[k]]), hn::Load(f, sheared[2][v[k]])};
       }
-      auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
-      const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
-      for (int e = 0; e < 3; ++e) {
-        const auto product = hn::Mul(corner[from[e]].y, corner[to[e]].x);
-        const auto value = hn::MulSub(corner[from[e]].x, corner[to[e]].y, product);
-        const auto bound = hn::MulAdd(hn::Set(f, kEdgeError), hn::Abs(product), hn::Set(f, kEdgeUnderflow));
-        positive = hn::Or(positive, hn::Gt(value, bound));
-        negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
-      }
-      uint32_t left = rays & ~bits_of(hn::And(positive, negative));
+      uint32_t left = rays & ~bits_of(edges_differ(corner));
       if (left == 0) continue;
-      const auto a = hn::Mul(corner[0].z, inverse), b = hn::Mul(corner[1].z, inverse),
-                 c = hn::Mul(corner[2].z, inverse);
-      const auto t = hn::Load(f, packet.t);
-      left &= ~bits_of(hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), hn::MulAdd(t, hn::Set(f, kReachScale), pads)),
-                              hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(pads))));
+      left &= ~bits_of(out_of_reach(corner, inverse, pads, hn::Load(f, packet.t)));
       if (left == 0) continue;
       if ((left & (left - 1)) == 0 || leaf.has_coverage()) {
         test_rays(packet, leaf, leaf_offset(ref), i, left, rays);
@@ -184,6 +171,7 @@ class PacketLeaves {
     const TreeletView treelet(packet.page);
     for (; left != 0; left &= left - 1) {
       const auto lane = static_cast<uint32_t>(std::countr_zero(left));
+      // No weights: only coverage needs them, and leaves with coverage go to test_rays().
       take(packet, treelet, leaf, offset, i, lane, {t_plane[lane], 0, 0}, rays);
     }
   }

@@ -12,7 +12,7 @@ inline constexpr uint32_t kMaxPacketRays = 16;
 /// Packets are filled apart for each sign of the direction and each longest axis.
 inline constexpr uint32_t kPacketKinds = 8 * 3;
 /// Packets traced in turn: while one waits for memory the others go on.
-inline constexpr uint32_t kWalks = 4;
+inline constexpr uint32_t kPacketsInTurn = 4;
 
 /// What is still to visit, and which rays enter it where.
 struct alignas(64) PacketEntry {
@@ -34,14 +34,16 @@ struct Packet {
   float t[kMaxPacketRays];
   Ray* rays[kMaxPacketRays];
   uint32_t node_tests[kMaxPacketRays], triangle_tests[kMaxPacketRays], treelets[kMaxPacketRays];
-  RaySpace space[kMaxPacketRays];  ///< of the lanes in `ready`
+  /// Of the lanes in `ready`, a bit each; only what tests of one ray against a leaf read: origin, inverse, direction along
+  /// kz, axes, shear and pad.
+  RaySpace space[kMaxPacketRays];
   uint32_t ready;
   uint32_t count;        ///< of rays
-  uint32_t alive;        ///< lanes whose answer is not known, a bit each
+  uint32_t alive;        ///< lanes with more to find, a bit each: any-hit rays leave at their hit
   uint32_t extreme;      ///< lanes that go another way
   uint32_t negative[3];  ///< of all rays: RaySpace::negative
   uint32_t k[3];         ///< of all rays: kx, ky, kz
-  bool in_treelet;
+  bool in_treelet;  ///< what is visited is in `entry`'s treelet, seen through the next three
   TreeletEntry entry;
   const std::byte* page;
   const std::byte* leaves;
@@ -57,7 +59,7 @@ struct WaitingRays {
 };
 
 struct PacketState {
-  Packet packets[kWalks];
+  Packet packets[kPacketsInTurn];
   WaitingRays waiting[kPacketKinds];
 };
 

@@ -43,6 +43,7 @@ struct LaneTracer {
   ~LaneTracer();
   static uint64_t bytes();
   /// Starts `most` rays of the stream, fewer if it ends, and traces them. Returns how many.
+  /// Requires, as PacketTracer: a top tree of at most kMaxTopDepth levels.
   uint64_t trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
 
   std::unique_ptr<struct SceneLanes> lanes;
@@ -62,7 +63,7 @@ struct PacketTracer {
   /// Whether this processor has a kernel for packets.
   static bool available();
   /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait
-  /// for the next call, or for next_waiting().
+  /// for the next call, or for next_waiting(). Requires: available(), and that the tree is of a single_identity().
   PacketUse trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
   /// Takes a ray back that waits for a packet; nullptr: none does.
   Ray* next_waiting();

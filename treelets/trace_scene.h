@@ -3,14 +3,14 @@
 // page; where pages come and go, TopTree::next and trace_treelets. Answers are the same to the bit.
 // Called by engine/render_hybrid and bench/against_embree.
 //
-// Two ways, chosen by what the last rays did (docs/decisions/0018): packets, which test a box for 16 rays at once,
+// Two ways, chosen by what the last rays did (docs/decisions/0018): packets, which test a box for 16 rays at once (8 with AVX2),
 // while enough rays enter the same nodes (camera rays, shadow rays, bounces in small scenes), else rays by themselves,
 // several in turn.
 //
 // Properties and assumptions
 //   order      rays end in any order and do not affect each other.
 //   threads    any number, each with a tracer and a stream of its own.
-//   memory     fixed: about 1.3 MiB a tracer, most of it stack that is hardly ever touched.
+//   memory     fixed: bytes(), about 1 MiB a tracer, most of it stack that is hardly ever touched.
 #pragma once
 
 #include <cstddef>
@@ -33,17 +33,20 @@ class RayStream {
   virtual ~RayStream() = default;
   /// The next ray, as it was begun (no cursor, no instance), which stays where it is until done(); nullptr: there is
   /// none for now. Asked again as long as rays are under way, so one may be there after a done().
-  /// Give some hundred rays before the first is done, better thousands: packets are filled from them.
+  /// Up to 24 x 15 rays wait for others of their kind beside 4 x 16 under way: have at least 500 out at once.
   virtual Ray* next() = 0;
   /// The answer of `ray` is known.
   virtual void done(Ray& ray, const RayWork& work) = 0;
-  /// Brings a page that the table does not have, and keeps it; nullptr: it cannot, and rays go around it.
+  /// Reads a page that the table does not have, keeps it until the trace ends, and enters it in the table. nullptr: it
+  /// failed; rays go on without that treelet, so that answers are wrong and the picture must be dropped.
   virtual const std::byte* bring(TreeletId treelet) = 0;
 };
 
 /// Decoded geometry pages by treelet, with bytes behind them as trace_treelets() requires; nullptr: not in memory yet.
 using PageTable = const std::byte* const*;
 
+/// kPackets: where they can be. Not with instances (a packet needs one space), nor on processors without vectors of 256
+/// bits; there rays go single.
 enum class RayGrouping { kAuto, kPackets, kSingle };
 
 class SceneTracer {

@@ -26,11 +26,11 @@ class PacketRun : private PacketLeaves {
 
   /// `most` full packets, and when the stream ends before, what is left over.
   HWY_INLINE void run(uint64_t most) {
-    Packet* walks[kWalks];  // first those under way
-    for (uint32_t i = 0; i < kWalks; ++i) walks[i] = &state_.packets[i];
+    Packet* walks[kPacketsInTurn];  // first those under way
+    for (uint32_t i = 0; i < kPacketsInTurn; ++i) walks[i] = &state_.packets[i];
     uint32_t active = 0;
     for (;;) {
-      for (; active < kWalks && use_.packets < most; ++active) {
+      for (; active < kPacketsInTurn && use_.packets < most; ++active) {
         if (!take_full(*walks[active]) && !(active == 0 && take_waiting(*walks[0]))) break;
         begin(*walks[active]);
         ++use_.packets;
@@ -279,12 +279,12 @@ class PacketRun : private PacketLeaves {
   HWY_INLINE void cross_top(Packet& packet, uint32_t index, uint32_t rays) {
     const TopNode& node = tables_.nodes[index];
     uint32_t refs[8];
-    uint32_t count = 0;
+    uint32_t children = 0;
     for (uint32_t slot = 0; slot < 8; ++slot) {
       refs[slot] = top_ref(node, slot);
-      if (node.kind[slot] != ChildKind::kEmpty) count = slot + 1;
+      if (node.kind[slot] != ChildKind::kEmpty) children = slot + 1;
     }
-    push_children(packet, rays, count,
+    push_children(packet, rays, children,
                   [&](uint32_t side, uint32_t axis) { return (side != 0 ? node.hi : node.lo)[axis]; }, refs);
   }
 

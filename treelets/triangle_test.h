@@ -1,7 +1,8 @@
 // The ray-triangle test: watertight (Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection"), both
 // sides. The corners are translated and sheared in float, alike for every triangle that shares them; then the signs
-// of the three edge functions are decided exactly, in double, where products of floats are exact. Scalar; the SIMD
-// kernel (leaf_kernel-inl.h) tests whole leaves in float first and only rejects what this certainly rejects.
+// of the three edge functions are decided exactly, in double, where products of floats are exact. The SIMD
+// kernels test whole leaves in float first and reject only what this certainly rejects (leaf_kernel-inl.h), then do
+// these operations in lanes, to the same bits (hit_kernel-inl.h, packet_leaf_kernel-inl.h).
 //
 // Error of an edge function e = p1 - p2 in float, p2 rounded, p1 rounded or fused (u = 2^-24):
 // |e - exact| <= u |p1| + u |p2| + u |e| + 2^-149 with |p1| <= |p2| + |e| (1 + u), so that the sign is certain when
