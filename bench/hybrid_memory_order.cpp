@@ -55,7 +55,8 @@ void HybridTracer::trace(const RaySet& set, const std::function<RayRange()>& gra
 
 Ray* HybridTracer::next() {
   if (free_count_ == 0) return nullptr;
-  if (range_.first == range_.last && (range_ = (*grab_)()).first == range_.last) return nullptr;
+  if (range_.first == range_.last) range_ = (*grab_)();
+  if (range_.first == range_.last) return nullptr;
   Ray& ray = rays_[free_[--free_count_]];
   ray = begin_ray(set_->rays[range_.first], static_cast<uint32_t>(range_.first), set_->any_hit);
   ++range_.first;

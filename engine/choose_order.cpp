@@ -33,7 +33,7 @@ FirstChoice choose_before_trials(Order asked, const MemoryPlan& plan, uint64_t s
   if (!plan.every_order_fits) return {{Order::kQueued, "too little memory to try others"}};
   if (samples / kTrialsARender >= trial_samples(plan)) return {{Order::kQueued, "loads the pages"}, true};
   if (plan.scene_page_bytes() <= kSmallSceneBytes) {
-    return {{Order::kHybrid, "a small scene, too few samples to try others"}};
+    return {{Order::kHybrid, "a small scene in memory, too few samples to try others"}};
   }
   return {{Order::kQueued, "too few samples to try others"}};
 }

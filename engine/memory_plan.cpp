@@ -126,9 +126,9 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
   const uint64_t least_paths = asked_paths > 0 ? asked_paths : std::min<uint64_t>(kMinimumPaths, samples);
   uint64_t least_pages = std::max(least_cache, execution.page_cache_bytes);
   if (order == Order::kHybrid) {
-    least_pages = plan.scene_page_bytes();
+    least_pages = std::max(plan.scene_page_bytes(), execution.page_cache_bytes);
     plan.ray_bytes = HybridPaths::bytes(scene.treelet_count, threads);
-    if (execution.page_cache_bytes > 0 && execution.page_cache_bytes < least_pages) {
+    if (execution.page_cache_bytes > 0 && execution.page_cache_bytes < plan.scene_page_bytes()) {
       return Error{ErrorCode::kMemoryCap,
                    fmt::format("a page cache of {} bytes cannot hold every page, as the hybrid order needs; the smallest "
                                "that works is {} bytes", execution.page_cache_bytes, least_pages)};

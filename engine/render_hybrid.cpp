@@ -46,6 +46,7 @@ class HybridWorker final : public RayStream {
   }
 
   const std::byte* bring(TreeletId treelet) override {
+    if (context_.ended.load(std::memory_order_relaxed)) return nullptr;
     worker_.enter(Phase::kPaging);
     paths_.pins[treelet] = worker_.pin(treelet);
     if (paths_.pins[treelet]) paths_.pages[treelet] = paths_.pins[treelet].bytes().data();

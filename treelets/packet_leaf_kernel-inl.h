@@ -164,9 +164,11 @@ class PacketLeaves {
       t_far = hn::Min(t_far, hn::Max(hn::Mul(lo, far_inverse), hn::Mul(hi, far_inverse)));
     }
     const auto t_max = hn::Load(f, packet.t);
-    const auto t = hn::Min(hn::Max(hn::Load(f, t_plane), t_near), t_far);
+    const auto plane_t = hn::Load(f, t_plane);
+    const auto number = hn::Eq(plane_t, plane_t);  // std::max() keeps what is none, and that is no hit
+    const auto t = hn::Min(hn::Max(plane_t, t_near), t_far);
     const auto entered = hn::Le(t_near, hn::Min(t_far, t_max));
-    left &= crossed & bits_of(hn::And(entered, hn::And(hn::Gt(t, hn::Zero(f)), hn::Le(t, t_max))));
+    left &= crossed & bits_of(number) & bits_of(hn::And(entered, hn::And(hn::Gt(t, hn::Zero(f)), hn::Le(t, t_max))));
     hn::Store(t, f, t_plane);
     const TreeletView treelet(packet.page);
     for (; left != 0; left &= left - 1) {

@@ -62,7 +62,8 @@ SceneTracer::SceneTracer(const TopTree& tree, PageTable pages, RayGrouping group
       packets_(std::make_unique<PacketTracer>()) {
   uint32_t deepest = 0;
   for (const TopNode& node : tree.nodes()) deepest = std::max(deepest, node.level);
-  deep_ = 2 * (deepest + 1) > kMaxTopDepth;  // of the tree over instances and of an object
+  const size_t most = std::max({tree.nodes().size(), tree.entries().size(), size_t{tree.instance_count()}});
+  slow_ = 2 * (deepest + 1) > kMaxTopDepth || most > kIndexMask;  // of the tree over instances and of an object
 }
 
 SceneTracer::~SceneTracer() = default;
@@ -79,8 +80,8 @@ void SceneTracer::trace(RayStream& stream, TraceCounters& counters) {
     while (Ray* ray = stream.next()) stream.done(*ray, {});
     return;
   }
-  const SceneTables tables{&tree_, tree_.nodes().data(), tree_.entries().data(), &tree_.instance(0), pages_};
-  if (deep_) {
+  const SceneTables tables{&tree_, tree_.nodes().data(), tree_.entries().data(), tree_.instances().data(), pages_};
+  if (slow_) {
     while (Ray* ray = stream.next()) stream.done(*ray, trace_slowly(tables, *ray, stream, counters));
     return;
   }

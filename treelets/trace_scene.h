@@ -65,7 +65,7 @@ class SceneTracer {
   const TopTree& tree_;
   PageTable pages_;
   RayGrouping grouping_;
-  bool deep_;                ///< the top tree may need more stack than there is: every ray goes the slow way
+  bool slow_;                ///< the top tree is too deep or too large for the kernels: every ray goes the slow way
   bool in_packets_ = true;   ///< what the last rays did better in
   std::unique_ptr<struct LaneTracer> lanes_;
   std::unique_ptr<struct PacketTracer> packets_;

@@ -117,6 +117,7 @@ class StreamTracer {
   HWY_INLINE uint64_t run() {
     for (uint32_t lane = 0; lane < kSceneLanes; ++lane) start(lane);
     for (;;) {
+      if (HWY_UNLIKELY(idle_.size() > 0 && served_)) start_idle();
       const uint32_t tops = waiting_[kTops].size(), nodes = waiting_[kNodes].size(), leaves = waiting_[kLeaves].size();
       if (tops >= nodes && tops >= leaves) {
         if (tops == 0) return started_;
@@ -136,7 +137,8 @@ class StreamTracer {
   HWY_INLINE void start(uint32_t index) {
     while (started_ < most_) {
       Ray* ray = stream_.next();
-      if (ray == nullptr) return;
+      served_ = ray != nullptr;
+      if (!served_) return idle_.add(index);
       ++started_;
       SceneLane& lane = lanes_[index];
       lane.ray = ray;
@@ -157,6 +159,13 @@ class StreamTracer {
       if (HWY_LIKELY(!lane.space->extreme)) return waiting_[kTops].add(index);
       stream_.done(*ray, trace_slowly(tables_, *ray, stream_, counters_));
     }
+  }
+
+  /// The stream, which had no ray for some lanes, has given one since.
+  HWY_NOINLINE void start_idle() {
+    const SceneLaneList list = idle_;
+    idle_.clear();
+    for (uint32_t i = 0; i < list.size(); ++i) start(list[i]);
   }
 
   /// The lane visits lane.ref, in its treelet, when its turn comes.
@@ -322,6 +331,8 @@ class StreamTracer {
   RayStream& stream_;
   TraceCounters& counters_;
   SceneLaneList waiting_[3];
+  SceneLaneList idle_;   ///< lanes that the stream had no ray for
+  bool served_ = false;  ///< it had one when it was last asked
 };
 
 uint64_t trace_lanes(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,

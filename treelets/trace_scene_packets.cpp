@@ -226,7 +226,7 @@ class PacketRun : private PacketLeaves {
 
   /// Children of which some of `rays` enter go to the stack, the first to be entered on top.
   template <class Plane>
-  HWY_INLINE void push_children(Packet& packet, uint32_t rays, uint32_t count_children, const Plane& plane,
+  HWY_INLINE void push_children(Packet& packet, uint32_t rays, uint32_t count_children, uint32_t there, const Plane& plane,
                                 const uint32_t* refs) {
     const F16 f;
     use_.node_visits += 1, use_.ray_visits += static_cast<uint64_t>(std::popcount(rays));
@@ -260,7 +260,7 @@ class PacketRun : private PacketLeaves {
     }
     uint32_t keys[8];
     uint32_t size = 0;
-    for (; entered != 0; entered &= entered - 1) {
+    for (entered &= there; entered != 0; entered &= entered - 1) {
       const auto slot = static_cast<uint32_t>(std::countr_zero(entered));
       const uint32_t key = entry_key(near[slot][std::countr_zero(enter[slot])], slot);
       uint32_t i = size++;
@@ -279,12 +279,14 @@ class PacketRun : private PacketLeaves {
   HWY_INLINE void cross_top(Packet& packet, uint32_t index, uint32_t rays) {
     const TopNode& node = tables_.nodes[index];
     uint32_t refs[8];
-    uint32_t children = 0;
+    uint32_t children = 0, there = 0;
     for (uint32_t slot = 0; slot < 8; ++slot) {
       refs[slot] = top_ref(node, slot);
-      if (node.kind[slot] != ChildKind::kEmpty) children = slot + 1;
+      // An instance cannot be here, but in a damaged file.
+      const bool used = node.kind[slot] == ChildKind::kNode || node.kind[slot] == ChildKind::kEntry;
+      if (used) children = slot + 1, there |= 1u << slot;
     }
-    push_children(packet, rays, children,
+    push_children(packet, rays, children, there,
                   [&](uint32_t side, uint32_t axis) { return (side != 0 ? node.hi : node.lo)[axis]; }, refs);
   }
 
@@ -301,7 +303,7 @@ class PacketRun : private PacketLeaves {
         hn::Store(hn::MulAdd(hi, step, origin), f, planes[3 + axis] + first);
       }
     }
-    push_children(packet, rays, node.child_count,
+    push_children(packet, rays, node.child_count, 0xff,
                   [&](uint32_t side, uint32_t axis) { return planes[3 * side + axis]; }, node.child);
   }
 

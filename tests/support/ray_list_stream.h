@@ -1,6 +1,8 @@
 // A list of rays as a stream for SceneTracer, with the pages of a hand-made scene that are brought one by one.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <vector>
 
 #include "tests/support/hand_made_scene.h"
@@ -10,9 +12,14 @@ namespace shoal::testing {
 
 class RayListStream final : public RayStream {
  public:
-  RayListStream(std::vector<Ray>& rays, const TestScene& scene)
-      : table(scene.pages.size()), done_(rays.size()), rays_(rays), scene_(scene) {}
-  Ray* next() override { return next_ < rays_.size() ? &rays_[next_++] : nullptr; }
+  /// At most `most_out` rays are out at once; with `hesitates`, it says now and then that there is none for now.
+  RayListStream(std::vector<Ray>& rays, const TestScene& scene, size_t most_out = SIZE_MAX, bool hesitates = false)
+      : table(scene.pages.size()), done_(rays.size()), rays_(rays), scene_(scene), most_out_(most_out),
+        hesitates_(hesitates) {}
+  Ray* next() override {
+    const bool none = next_ == rays_.size() || next_ - done_count >= most_out_ || (hesitates_ && ++asked_ % 7 == 1);
+    return none ? nullptr : &rays_[next_++];
+  }
   void done(Ray& ray, const RayWork& work) override {
     EXPECT_FALSE(done_[&ray - rays_.data()]);
     done_[&ray - rays_.data()] = true;
@@ -32,10 +39,12 @@ class RayListStream final : public RayStream {
   std::vector<bool> done_;
   std::vector<Ray>& rays_;
   const TestScene& scene_;
-  size_t next_ = 0;
+  const size_t most_out_;
+  const bool hesitates_;
+  size_t next_ = 0, asked_ = 0;
 };
 
-/// All of them from start to end, by SceneTracer.
+/// All of them from start to end, by SceneTracer: the rays at their ends.
 inline std::vector<Ray> trace_together(const TopTree& tree, const TestScene& scene, std::vector<Ray> rays,
                                        RayGrouping grouping) {
   RayListStream stream(rays, scene);

@@ -243,6 +243,86 @@ TEST(Trace, DuplicatesResolveToTheSmallestId) {
   EXPECT_GT(hits, 300u);
 }
 
+/// Half of the rays from one place in like directions, in runs of thousands, so that packets are left and taken up.
+std::vector<Ray> changing_rays(std::mt19937& random, const std::vector<TestTriangle>& triangles, size_t count) {
+  std::vector<Ray> rays;
+  std::uniform_real_distribution<float> uniform(0, 1);
+  while (rays.size() < count) {
+    const std::vector<Ray> awkward = awkward_rays(random, triangles, 3000);
+    rays.insert(rays.end(), awkward.begin(), awkward.end());
+    for (int i = 0; i < 6000; ++i) {
+      rays.push_back(make_ray({0.1f, 0.2f, 3}, {0.3f * uniform(random), 0.3f * uniform(random), -1}));
+    }
+  }
+  return rays;
+}
+
+TEST(SceneTracer, LosesNoRayWhateverTheStreamSaysAndHoweverItChangesItsWays) {
+  std::mt19937 random(9);
+  const auto soup = random_soup(random, 2000, 0.1f);
+  const TestScene scene = make_scene({soup}, {{0, {}}}, {200, 4});
+  const TopTree tree(scene.nodes, scene.entries, scene.instances);
+  const std::vector<Ray> rays = changing_rays(random, soup, 80000);
+  std::vector<Ray> expected = rays;
+  for (Ray& ray : expected) trace_scene(tree, scene.pages, ray, trace_treelet);
+  for (const size_t most_out : {size_t{1}, size_t{40}, size_t{1000}, SIZE_MAX}) {
+    for (const bool hesitates : {false, true}) {
+      for (const RayGrouping grouping : {RayGrouping::kAuto, RayGrouping::kPackets, RayGrouping::kSingle}) {
+        std::vector<Ray> found = rays;
+        RayListStream stream(found, scene, most_out, hesitates);
+        TraceCounters counters;
+        SceneTracer tracer(tree, stream.table.data(), grouping);
+        for (int call = 0; call < 200000 && stream.done_count < rays.size(); ++call) tracer.trace(stream, counters);
+        ASSERT_EQ(stream.done_count, rays.size());
+        for (size_t i = 0; i < rays.size(); ++i) {
+          expect_same(expected[i], found[i], i);
+          if (HasFatalFailure()) return;
+        }
+      }
+    }
+  }
+}
+
+TEST(SceneTracer, AnEmptySceneIsMissed) {
+  const TestScene scene = make_scene({}, {});
+  for (const TopTree& tree : {TopTree(), TopTree(scene.nodes, scene.entries, scene.instances)}) {
+    for (const RayGrouping grouping : {RayGrouping::kAuto, RayGrouping::kPackets, RayGrouping::kSingle}) {
+      const auto found = trace_together(tree, scene, {make_ray({0, 0, 0}, {1, 2, 3})}, grouping);
+      EXPECT_FALSE(found[0].hit.valid());
+    }
+  }
+}
+
+/// Rays go around a treelet whose page cannot be had.
+class FailingStream final : public RayStream {
+ public:
+  explicit FailingStream(std::vector<Ray>& rays) : rays_(rays) {}
+  Ray* next() override { return next_ < rays_.size() ? &rays_[next_++] : nullptr; }
+  void done(Ray&, const RayWork&) override { ++done_count; }
+  const std::byte* bring(TreeletId) override { return nullptr; }
+  size_t done_count = 0;
+
+ private:
+  std::vector<Ray>& rays_;
+  size_t next_ = 0;
+};
+
+TEST(SceneTracer, EndsWhenNoPageCanBeHad) {
+  std::mt19937 random(10);
+  const auto soup = random_soup(random, 500, 0.1f);
+  const TestScene scene = make_scene({soup}, {{0, {}}}, {50, 4});
+  const TopTree tree(scene.nodes, scene.entries, scene.instances);
+  const std::vector<const std::byte*> none(scene.pages.size(), nullptr);
+  for (const RayGrouping grouping : {RayGrouping::kPackets, RayGrouping::kSingle}) {
+    std::vector<Ray> rays = awkward_rays(random, soup, 500);
+    FailingStream stream(rays);
+    TraceCounters counters;
+    SceneTracer(tree, none.data(), grouping).trace(stream, counters);
+    EXPECT_EQ(stream.done_count, rays.size());
+    for (const Ray& ray : rays) EXPECT_FALSE(ray.hit.valid());
+  }
+}
+
 TEST(Trace, GivesTheSameBitsOnEveryInstructionSet) {
   std::mt19937 random(8);
   const auto soup = random_soup(random, 1000, 0.2f);
