@@ -98,7 +98,6 @@ class TopTree {
     return entries_[nodes_[ray.cursor >> 3].child[ray.cursor & 7]];
   }
   const Instance& instance(uint32_t index) const { return instances_[index]; }
-  std::span<const Instance> instances() const { return instances_; }
   uint32_t instance_count() const { return static_cast<uint32_t>(instances_.size()); }
   std::span<const TopNode> nodes() const { return nodes_; }
   std::span<const TreeletEntry> entries() const { return entries_; }
