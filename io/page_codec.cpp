@@ -1,6 +1,7 @@
 #include "io/page_codec.h"
 
 #include <lz4.h>
+#include <lz4hc.h>
 #define XXH_STATIC_LINKING_ONLY  // the size of the state of a piecewise hash
 #include <xxhash.h>
 
@@ -14,6 +15,12 @@ namespace {
 // LZ4 takes sizes as int.
 static_assert(kMaxPageBytes <= LZ4_MAX_INPUT_SIZE);
 
+/// What the fast way leaves above three quarters of its size is tried by the thorough one: 14.4 bytes a triangle became
+/// 13.1 in the coffee scene. For all pages it would take 1.4 times the processor time of a build, and make that 12.4 and
+/// terrain 12 % smaller.
+constexpr uint64_t kPoorNumerator = 3, kPoorDenominator = 4;
+constexpr int kThoroughLevel = 3;  // of LZ4 HC; the least
+
 char* chars(std::byte* p) { return reinterpret_cast<char*>(p); }
 const char* chars(const std::byte* p) { return reinterpret_cast<const char*>(p); }
 
@@ -25,8 +32,11 @@ uint64_t compressed_bound_bytes(uint64_t raw_bytes) {
 
 uint32_t compress_page(std::span<const std::byte> raw, std::span<std::byte> out) {
   if (raw.size() <= kPageAlignment) return 0;
-  const int size = LZ4_compress_default(chars(raw.data()), chars(out.data()), static_cast<int>(raw.size()),
-                                        static_cast<int>(out.size()));
+  const int raw_size = static_cast<int>(raw.size()), room = static_cast<int>(out.size());
+  int size = LZ4_compress_default(chars(raw.data()), chars(out.data()), raw_size, room);
+  if (size <= 0 || static_cast<uint64_t>(size) * kPoorDenominator > raw.size() * kPoorNumerator) {
+    size = LZ4_compress_HC(chars(raw.data()), chars(out.data()), raw_size, room, kThoroughLevel);
+  }
   if (size <= 0) return 0;
   const auto stored = static_cast<uint64_t>(size);
   return align_up(stored, kPageAlignment) < align_up(raw.size(), kPageAlignment) ? static_cast<uint32_t>(stored)
