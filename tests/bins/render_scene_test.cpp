@@ -122,11 +122,11 @@ TEST(RenderScene, TheOrderIsChosenUnlessItIsNamedAndSaysWhy) {
                                                 folder / "out.json"}, tiny_picture());
   const ProgramRun chosen = run_shoal(folder, render);
   expect_exit(chosen, 0);
-  EXPECT_THAT(chosen.err, HasSubstr("order: queued (too few samples to try others)"));
+  EXPECT_THAT(chosen.err, HasSubstr("order: hybrid (a small scene in memory, too few samples to try others)"));
   json options = parsed(file_text(folder / "out.json"))["options"];
-  EXPECT_EQ(options["order"], "queued");
+  EXPECT_EQ(options["order"], "hybrid");
   EXPECT_EQ(options["order_asked"], "auto");
-  EXPECT_EQ(options["order_reason"], "too few samples to try others");
+  EXPECT_EQ(options["order_reason"], "a small scene in memory, too few samples to try others");
   const ProgramRun named = run_shoal(folder, join(render, {"--order", "sorted"}));
   expect_exit(named, 0);
   EXPECT_THAT(named.err, ::testing::Not(HasSubstr("order:")));
@@ -140,14 +140,14 @@ TEST(RenderScene, CompareFindsTheOrdersIdentical) {
   const TemporaryFolder folder;
   make_terrain(folder);
   const ProgramRun run = run_shoal(folder, join({"compare", folder / "terrain.shoal", "--orders",
-                                                 "queued,depth-first,sorted", "--out", folder / "compare"},
+                                                 "queued,depth-first,sorted,hybrid", "--out", folder / "compare"},
                                                 tiny_picture()));
   expect_exit(run, 0);
   EXPECT_THAT(run.out, HasSubstr("identical"));
   const json report = parsed(file_text(folder / "compare/compare.json"));
   EXPECT_EQ(report["pictures_identical"], true);
   ASSERT_TRUE(report["orders"].contains("queued") && report["orders"].contains("depth-first"));
-  for (const char* order : {"queued", "depth-first", "sorted"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid"}) {
     expect_stats(report["orders"][order], 24 * 16);
     EXPECT_EQ(report["orders"][order]["options"]["order"], order);
     const bool ahead = report["orders"][order]["options"]["read_backend"].get<std::string>() != "none";
