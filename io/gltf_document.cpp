@@ -115,6 +115,7 @@ Result<Document> load_document(FileSystem& fs, const std::string& path, const Li
   read_accessors(root, limits, document);
   read_textures(root, limits, document);
   read_materials(root, limits, document);
+  read_variants(root, limits, document);
   read_meshes(root, limits, document);
   read_cameras_and_lights(root, limits, document);
   read_nodes(root, limits, document);

@@ -80,11 +80,18 @@ enum class PrimitiveMode : uint8_t {
   kTriangleFan
 };
 
+/// KHR_materials_variants: the material of a primitive in some variants.
+struct VariantMaterial {
+  uint32_t material = 0;
+  std::vector<uint32_t> variants;  ///< indices into Document::variants
+};
+
 struct Primitive {
   std::map<std::string, uint32_t> attributes;  ///< POSITION, NORMAL, TEXCOORD_0, ... -> accessor
   std::optional<uint32_t> indices;
   std::optional<uint32_t> material;
   PrimitiveMode mode = PrimitiveMode::kTriangles;
+  std::vector<VariantMaterial> variant_materials;
 };
 
 struct Mesh {
@@ -95,6 +102,32 @@ struct Mesh {
 struct TextureInfo {
   uint32_t texture = 0;
   uint32_t texcoord = 0;
+  std::array<double, 2> offset{0, 0}, scale{1, 1};  ///< KHR_texture_transform: scaled, then rotated, then moved
+  double rotation = 0;                              ///< radians
+
+  bool transformed() const {
+    return offset != std::array<double, 2>{0, 0} || scale != std::array<double, 2>{1, 1} || rotation != 0;
+  }
+};
+
+/// Extensions that add lobes to a material or take some away; the defaults do nothing.
+struct MaterialExtensions {
+  bool unlit = false;                      ///< KHR_materials_unlit
+  double transmission = 0;                 ///< KHR_materials_transmission
+  bool has_volume = false;                 ///< KHR_materials_volume with a thickness above 0
+  double attenuation_distance = 0;         ///< world units; 0: infinite, nothing is absorbed
+  std::array<double, 3> attenuation_color{1, 1, 1};
+  double dispersion = 0;                   ///< KHR_materials_dispersion: 20 / Abbe number
+  double clearcoat = 0, clearcoat_roughness = 0, clearcoat_normal_scale = 1;
+  std::array<double, 3> sheen_color{0, 0, 0};
+  double sheen_roughness = 0;
+  double anisotropy = 0, anisotropy_rotation = 0;
+  double iridescence = 0, iridescence_ior = 1.3, film_minimum = 100, film_maximum = 400;  ///< thickness in nm
+  double diffuse_transmission = 0;
+  std::array<double, 3> diffuse_transmission_color{1, 1, 1};
+  std::optional<TextureInfo> transmission_texture, clearcoat_texture, clearcoat_roughness_texture,
+      clearcoat_normal_texture, sheen_color_texture, sheen_roughness_texture, anisotropy_texture,
+      iridescence_texture, film_texture, diffuse_transmission_texture, diffuse_transmission_color_texture;
 };
 
 enum class AlphaMode : uint8_t { kOpaque, kMask, kBlend };
@@ -107,13 +140,14 @@ struct Material {
   double emissive_strength = 1;            ///< KHR_materials_emissive_strength
   double specular = 1;                     ///< KHR_materials_specular
   std::array<double, 3> specular_color{1, 1, 1};
-  double ior = 1.5;                        ///< KHR_materials_ior (F0 only, until transmission is here)
+  double ior = 1.5;                        ///< KHR_materials_ior
   double normal_scale = 1;
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   double alpha_cutoff = 0.5;
   bool double_sided = false;
   std::optional<TextureInfo> base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture,
       specular_texture, specular_color_texture;
+  MaterialExtensions more;
 };
 
 struct Sampler {
@@ -173,11 +207,16 @@ struct Document {
   std::vector<Camera> cameras;
   std::vector<Light> lights;
   std::vector<Node> nodes;
+  std::vector<std::string> variants;  ///< KHR_materials_variants: names
 };
 
 /// Fails with: kInput (missing, truncated, malformed, over a budget; names file and JSON place such as
 /// "accessors[3].count"), kUnsupported (extensionsRequired that are not read, named with what to do).
 Result<Document> load_document(FileSystem& fs, const std::string& path, const Limits& limits = {});
+/// Gives every primitive the material that it has in the variant of that name; the first of two with one name.
+/// Fails with: kUsage (no such variant; those there are are named).
+Status select_variant(Document& document, const std::string& name);
+
 /// Document::content_hash of the file as it is now, without reading it as JSON: a block at a time, so any size will do.
 /// Fails with: kInput (missing, a malformed .glb), kStorage.
 Result<uint64_t> json_hash(FileSystem& fs, const std::string& path);

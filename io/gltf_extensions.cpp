@@ -11,13 +11,27 @@ namespace shoal::gltf {
 
 namespace {
 
-constexpr std::array<std::string_view, 5> kRead = {
-    "KHR_lights_punctual",    "KHR_materials_emissive_strength", "KHR_materials_ior",
-    "KHR_materials_specular", "KHR_mesh_quantization",
+constexpr std::array<std::string_view, 16> kRead = {
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
 };
 
 /// Extensions that only describe: leaving them out changes no picture.
-constexpr std::array<std::string_view, 3> kWithoutEffect = {"KHR_xmp", "KHR_xmp_json_ld", "KHR_materials_variants"};
+constexpr std::array<std::string_view, 2> kWithoutEffect = {"KHR_xmp", "KHR_xmp_json_ld"};
 
 struct Advice {
   std::string_view name, text;

@@ -82,7 +82,7 @@ class JsonNode {
  private:
   friend class JsonText;
   static constexpr double kAny = std::numeric_limits<double>::max();
-  static constexpr uint32_t kMaxSteps = 8;  ///< materials[3].extensions.KHR_x.xTexture.index is 6
+  static constexpr uint32_t kMaxSteps = 12;  ///< meshes[3].primitives[1].extensions.KHR_x.mappings[0].variants[2] is 10
   struct Step {
     const char* name;  ///< nullptr: an index
     uint64_t index;

@@ -8,36 +8,6 @@ namespace shoal::gltf {
 
 namespace {
 
-/// Far above any light, far below what could overflow a path's product of factors.
-constexpr double kMaxRadiance = 1e10;
-constexpr uint64_t kMaxTexcoordSets = 16;
-
-std::optional<TextureInfo> read_texture_info(const JsonNode& parent, const char* name, const Document& document) {
-  const JsonNode node = parent.object(name);
-  if (!node.present()) return std::nullopt;
-  TextureInfo info;
-  info.texture = node.required_index("index", document.textures.size());
-  info.texcoord = static_cast<uint32_t>(node.whole("texCoord", 0, kMaxTexcoordSets - 1));
-  return info;
-}
-
-void read_material_extensions(const JsonNode& node, const Document& document, Material& material) {
-  const JsonNode extensions = node.object("extensions");
-  const JsonNode emissive = extensions.object("KHR_materials_emissive_strength");
-  material.emissive_strength = emissive.clamped("emissiveStrength", 1, 0, kMaxRadiance);
-  const JsonNode ior = extensions.object("KHR_materials_ior");
-  material.ior = ior.number("ior", 1.5);
-  if (material.ior != 0 && material.ior < 1) {  // 0 stands for infinity in the extension
-    ior.warn_at("ior", fmt::format("{} is below 1; 1 is used", material.ior));
-    material.ior = 1;
-  }
-  const JsonNode specular = extensions.object("KHR_materials_specular");
-  material.specular = specular.clamped("specularFactor", 1, 0, 1);
-  material.specular_color = specular.clamped_numbers<3>("specularColorFactor", {1, 1, 1}, 0, kMaxRadiance);
-  material.specular_texture = read_texture_info(specular, "specularTexture", document);
-  material.specular_color_texture = read_texture_info(specular, "specularColorTexture", document);
-}
-
 AlphaMode read_alpha_mode(const JsonNode& node) {
   const std::string mode = node.text("alphaMode", "OPAQUE");
   if (mode == "MASK") return AlphaMode::kMask;

@@ -55,12 +55,13 @@ void check_indices(const JsonNode& node, const Document& document, const Primiti
                            static_cast<int>(accessor.type)));
 }
 
-Primitive read_primitive(const JsonNode& node, const Document& document) {
+Primitive read_primitive(const JsonNode& node, const Limits& limits, const Document& document) {
   Primitive primitive;
   read_attributes(node, document, primitive);
   primitive.indices = node.index("indices", document.accessors.size());
   check_indices(node, document, primitive);
   primitive.material = node.index("material", document.materials.size());
+  read_variant_materials(node, limits, document, primitive);
   constexpr auto kLast = static_cast<uint64_t>(PrimitiveMode::kTriangleFan);
   primitive.mode =
       static_cast<PrimitiveMode>(node.whole("mode", static_cast<uint64_t>(PrimitiveMode::kTriangles), kLast));
@@ -79,7 +80,7 @@ void read_meshes(const JsonNode& root, const Limits& limits, Document& document)
     const JsonNode primitives = node.array("primitives", limits.objects_count);
     mesh.primitives.reserve(primitives.size());
     for (uint64_t k = 0; k < primitives.size() && !root.failed(); ++k) {
-      mesh.primitives.push_back(read_primitive(primitives.object_at(k), document));
+      mesh.primitives.push_back(read_primitive(primitives.object_at(k), limits, document));
     }
   }
 }

@@ -22,6 +22,15 @@ void read_buffers(const JsonNode& root, const std::optional<FileRange>& binary, 
 void read_accessors(const JsonNode& root, const Limits& limits, Document& document);
 void read_textures(const JsonNode& root, const Limits& limits, Document& document);
 void read_materials(const JsonNode& root, const Limits& limits, Document& document);
+/// Far above any light, far below what could overflow a path's product of factors.
+inline constexpr double kMaxRadiance = 1e10;
+std::optional<TextureInfo> read_texture_info(const JsonNode& parent, const char* name, const Document& document);
+/// `node` is a material.
+void read_material_extensions(const JsonNode& node, const Document& document, Material& material);
+void read_variants(const JsonNode& root, const Limits& limits, Document& document);
+/// `node` is a primitive.
+void read_variant_materials(const JsonNode& node, const Limits& limits, const Document& document,
+                            Primitive& primitive);
 void read_meshes(const JsonNode& root, const Limits& limits, Document& document);
 void read_cameras_and_lights(const JsonNode& root, const Limits& limits, Document& document);
 /// Nodes and the roots of the default scene; checks that they are a forest.
