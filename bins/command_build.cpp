@@ -11,7 +11,7 @@ namespace shoal {
 namespace {
 
 struct BuildArguments {
-  std::string scene, output, treelet_size, max_memory, scratch_folder;
+  std::string scene, output, treelet_size, max_memory, scratch_folder, variant;
   unsigned threads = 0;
   bool consume = false;
 };
@@ -28,6 +28,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   SHOAL_RETURN_IF_ERROR(check_output(arguments.output));
   options.scratch_folder = arguments.scratch_folder;
   options.consume = arguments.consume;
+  options.variant = arguments.variant;
   options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
   options.stop = stop_on_signals();
@@ -67,6 +68,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--scratch", arguments->scratch_folder,
                   "folder for what does not fit in memory: 40 bytes a triangle and 12 for each float of a corner's "
                   "attributes (default: that of the output)");
+  sub->add_option("--variant", arguments->variant, kVariantHelp);
   sub->add_flag("--consume", arguments->consume,
                 "DESTROYS the source: gives the disk space of its .bin parts back while they are read, even if the build "
                 "fails later; .gltf and images stay; not for .glb");

@@ -189,6 +189,11 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   app.add_option("--camera", picture.camera, "index among the scene's cameras")->capture_default_str();
   app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
+  app.add_option("--variant", variant, kVariantHelp);
+  app.add_option("--effects", effects,
+                 "force effects of materials off or on: -NAME or +NAME, separated by commas (--effects=-sheen), all, "
+                 "-all; `shoal info` lists them. On changes no picture")
+      ->type_name("LIST");
   app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   app.add_option("--max-memory", max_memory, kMaxMemoryHelp);
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")
@@ -247,7 +252,12 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   SHOAL_ASSIGN_OR_RETURN(prepared.execution.max_memory_bytes, size_or_zero(arguments.max_memory));
   SHOAL_ASSIGN_OR_RETURN(prepared.execution.page_cache_bytes, size_or_zero(arguments.page_cache));
   SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, parse_environment(arguments.environment));
+  SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.effects, parse_effects(arguments.effects));
+  if (!arguments.variant.empty() && is_shoal_file(arguments.scene)) {
+    return Error{ErrorCode::kUsage, "--variant is of a .gltf or .glb: a .shoal holds the variant that it was built with"};
+  }
   SceneBuildOptions build;
+  build.variant = arguments.variant;
   build.threads = arguments.execution.threads;
   build.scratch_folder = arguments.scratch_folder;
   build.max_memory_bytes = prepared.execution.max_memory_bytes;

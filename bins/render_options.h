@@ -36,9 +36,12 @@ Status check_output(const std::string& path);
 inline constexpr const char* kMaxMemoryHelp =
     "cap on the whole process, such as 2G (default: 70 % of the smaller of physical memory and control-group limits)";
 
+inline constexpr const char* kVariantHelp =
+    "name of one of the scene's material variants (default: the materials that it shows without one)";
+
 /// Options as they stand on the command line.
 struct RenderArguments {
-  std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder;
+  std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder, variant, effects;
   PictureOptions picture;
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false;

@@ -42,6 +42,8 @@ struct BsdfSample {
 
 class Bsdf {
  public:
+  static constexpr bool kTransmits = false;  ///< every direction is above the surface
+
   /// World-space unit vectors. `wo` points away from the surface, dot(geometric, wo) >= 0 and dot(shading, wo) > 0;
   /// otherwise the surface is black. `table` may be null when no material has a specular lobe.
   Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3& geometric_normal,

@@ -44,18 +44,20 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
   SourceHash hash(source_hash(sources, true));
   hash.add(options.treelet_bytes);
   hash.add(kSceneVersion);
+  if (!options.variant.empty()) hash.add(XXH3_64bits(options.variant.data(), options.variant.size()));
   hash.add(XXH3_64bits(kBuilderVersion, std::char_traits<char>::length(kBuilderVersion)));
   return hash.value();
 }
 
 std::string build_record_json(const gltf::Document& document, const SceneHeader& header,
-                              const SceneBuildReport& report) {
+                              const SceneBuildReport& report, const std::string& variant) {
   Json json;
   json["shoal_version"] = kBuilderVersion;
   json["scene_version"] = header.version;
   json["source"] = std::filesystem::path(document.path).filename().string();
   json["content_hash"] = fmt::format("{:016x}", header.content_hash);
   json["options"] = {{"treelet_bytes", header.treelet_bytes}};
+  if (!variant.empty()) json["options"]["variant"] = variant;
   json["triangles_count"] = header.triangles_count;
   json["instanced_triangles_count"] = header.instanced_triangles_count;
   json["degenerate_count"] = header.degenerate_count;

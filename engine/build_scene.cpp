@@ -91,6 +91,7 @@ class SceneBuilder {
     SHOAL_ASSIGN_OR_RETURN(document_bytes_, document_bytes(fs_, path_));
     SHOAL_RETURN_IF_ERROR(check_document(document_bytes_, cap_bytes(), path_));
     SHOAL_ASSIGN_OR_RETURN(document_, gltf::load_document(fs_, path_, options_.limits));
+    if (!options_.variant.empty()) SHOAL_RETURN_IF_ERROR(gltf::select_variant(document_, options_.variant));
     SHOAL_RETURN_IF_ERROR(sources_.add_parts(document_));
     note(document_.warnings);
     SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
@@ -146,7 +147,7 @@ class SceneBuilder {
                            tile_textures(fs_, files, document_, materials_.textures, limits, writer, coverage,
                                          [this](double fraction) { progress("textures", fraction); }));
     finish_materials(materials_, textures_.facts, geometry_.uses);
-    coverage.set_materials(materials_.materials, textures_.textures);
+    coverage.set_materials(materials_.materials, textures_.textures, materials_.transforms);
     report_.source_read_bytes += textures_.source_bytes;
     return {};
   }
@@ -257,7 +258,7 @@ class SceneBuilder {
       report_.warnings.push_back(fmt::format("and {} more warnings", more));
     }
     SHOAL_ASSIGN_OR_RETURN(const TopTables top, assemble_top_tree(built_, std::move(placed_)));
-    const std::string record = build_record_json(document_, header, report_);
+    const std::string record = build_record_json(document_, header, report_, options_.variant);
     const std::string names = names_json(document_, flat_, materials_.default_material != kNoIndex);
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kBuildRecord, std::as_bytes(std::span(record))));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kSceneHeader, std::vector{header}));
@@ -272,7 +273,9 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kCameras, convert_cameras(document_, flat_)));
     const std::string sources = sources_.table(output);
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kNames, std::as_bytes(std::span(names))));
-    return writer.append_table(tables::kSourceFiles, std::as_bytes(std::span(sources)));
+    SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kSourceFiles, std::as_bytes(std::span(sources))));
+    SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kMaterialLayers, materials_.layers));
+    return append_rows(writer, tables::kTextureTransforms, materials_.transforms);
   }
 
   FileSystem& fs_;

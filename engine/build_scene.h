@@ -29,6 +29,7 @@ struct SceneBuildOptions {
   /// also when the build fails or is stopped later on. Not for .glb.
   bool consume = false;
   uint64_t chunk_triangles = 0;   ///< triangles built at once; 0: from the memory plan (else for tests)
+  std::string variant;            ///< KHR_materials_variants, by name; empty: the materials as they are
   gltf::Limits limits;
   const std::atomic<bool>* stop = nullptr;             ///< ends the build with kStopped when it becomes true
   std::function<void(const BuildMemoryPlan&)> planned;  ///< may be empty; called once, before work starts
@@ -53,7 +54,7 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
                                      const SceneBuildOptions& options);
 
 /// What a built scene is kept under: a hash of the JSON, of sizes and modification times of the files it names, of
-/// treelet size and builder version; not of the cap, which changes the tree but never the picture.
+/// treelet size, variant and builder version; not of the cap, which changes the tree but never the picture.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

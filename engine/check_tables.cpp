@@ -38,6 +38,11 @@ class TableChecker {
     SHOAL_RETURN_IF_ERROR(each("textures", scene_.textures, [&](size_t i) { return texture(scene_.textures[i]); }));
     SHOAL_RETURN_IF_ERROR(
         each("materials", scene_.materials, [&](size_t i) { return material(scene_.materials[i]); }));
+    SHOAL_RETURN_IF_ERROR(each("material layers", scene_.material_layers,
+                               [&](size_t i) { return layers(scene_.material_layers[i]); }));
+    SHOAL_RETURN_IF_ERROR(each("texture transforms", scene_.texture_transforms, [&](size_t i) {
+      return finite(scene_.texture_transforms[i].m) ? nullptr : "finite numbers";
+    }));
     SHOAL_RETURN_IF_ERROR(each("emitters", scene_.emitters, [&](size_t i) { return emitter(i); }));
     SHOAL_RETURN_IF_ERROR(each("lights", scene_.lights, [&](size_t i) { return light(scene_.lights[i]); }));
     return each("cameras", scene_.cameras, [&](size_t i) { return camera(scene_.cameras[i]); });
@@ -105,12 +110,42 @@ class TableChecker {
 
   const char* slot(const TextureSlot& s) const {
     if (s.texture != kNoIndex && s.texture >= scene_.textures.size()) return "the index of a texture";
+    if (s.transform > scene_.texture_transforms.size()) return "the row of a texture transform";
     return s.uv_set < kMaxUvSets ? nullptr : "a uv set below 4";
+  }
+
+  const char* layers(const MaterialLayers& l) const {
+    for (const TextureSlot& s :
+         {l.transmission_texture, l.clearcoat_texture, l.clearcoat_roughness_texture, l.clearcoat_normal_texture,
+          l.sheen_color_texture, l.sheen_roughness_texture, l.anisotropy_texture, l.iridescence_texture,
+          l.film_texture, l.diffuse_transmission_texture, l.diffuse_transmission_color_texture}) {
+      if (const char* expected = slot(s)) return expected;
+    }
+    for (const float v : {l.transmission, l.clearcoat, l.clearcoat_roughness, l.sheen_color[0], l.sheen_color[1],
+                          l.sheen_color[2], l.sheen_roughness, l.anisotropy, l.iridescence, l.diffuse_transmission,
+                          l.diffuse_transmission_color[0], l.diffuse_transmission_color[1],
+                          l.diffuse_transmission_color[2]}) {
+      if (!(v >= 0 && v <= 1)) return "factors in [0, 1]";
+    }
+    for (const float v : {l.dispersion, l.film_minimum, l.film_maximum, -l.absorption[0], -l.absorption[1],
+                          -l.absorption[2]}) {
+      if (!(v >= 0) || !std::isfinite(v)) return "finite numbers of the right sign";
+    }
+    for (const float v : {l.ior, l.iridescence_ior}) {
+      if (!(v >= 1) || !std::isfinite(v)) return "a finite index of refraction from 1 on";
+    }
+    if (l.volume > 1) return "volume to be 0 or 1";
+    const bool turned = std::abs(l.anisotropy_cos) <= 1 && std::abs(l.anisotropy_sin) <= 1;
+    return turned && std::isfinite(l.clearcoat_normal_scale) ? nullptr : "a rotation and a finite normal scale";
   }
 
   const char* material(const Material& m) {
     if (m.coverage > CoverageMode::kBlend) return "a known coverage mode";
     if (m.flags > kMaterialEmits) return "known flags";
+    if (m.effects > kAllMaterialEffects) return "known effects";
+    if ((m.effects & kLayerEffects) != 0 && m.layers >= scene_.material_layers.size()) {
+      return "the row of its layers";
+    }
     for (const TextureSlot& s : {m.base_color_texture, m.metallic_roughness_texture, m.normal_texture,
                                  m.emissive_texture, m.specular_texture, m.specular_color_texture}) {
       if (const char* expected = slot(s)) return expected;

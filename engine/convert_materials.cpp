@@ -1,12 +1,10 @@
 #include "engine/convert_materials.h"
 
-#include <fmt/format.h>
+#include <limits>
 
-#include <algorithm>
-#include <map>
-#include <tuple>
-
+#include "engine/convert_layers.h"
 #include "engine/flatten_nodes.h"
+#include "engine/plan_slots.h"
 
 namespace shoal {
 
@@ -14,24 +12,9 @@ namespace {
 
 constexpr double kFloatMax = std::numeric_limits<float>::max();
 
-std::string material_name(const gltf::Document& document, uint32_t material) {
-  const std::string& name = document.materials[material].name;
-  return fmt::format("materials[{}]{}", material, name.empty() ? "" : " \"" + name + "\"");
-}
-
-WrapMode wrap_mode(uint32_t gl_enum) {
-  switch (gl_enum) {
-    case 33071:
-      return WrapMode::kClampToEdge;
-    case 33648:
-      return WrapMode::kMirroredRepeat;
-    default:
-      return WrapMode::kRepeat;
-  }
-}
-
 Material convert_factors(const gltf::Material& in) {
   Material out = {};
+  out.layers = kNoIndex;
   for (int i = 0; i < 4; ++i) out.base_color[i] = clamped_float(in.base_color[i], 0, 1);
   for (int i = 0; i < 3; ++i) {
     out.emissive[i] = clamped_float(in.emissive[i] * in.emissive_strength, 0, kFloatMax);
@@ -55,83 +38,48 @@ Material convert_factors(const gltf::Material& in) {
       out.coverage = CoverageMode::kBlend;
       break;
   }
+  if (in.more.unlit) {  // the extension: everything but the base colour is ignored
+    out.emissive[0] = out.emissive[1] = out.emissive[2] = 0;
+    out.effects = kEffectUnlit;
+  }
   return out;
 }
 
-/// Fills the texture slots of materials; a texture wanted in the same way twice is one.
-class SlotPlanner {
- public:
-  SlotPlanner(const gltf::Document& document, MaterialPlan& plan) : document_(document), plan_(plan) {}
+/// Fills the texture slots that every material has. A texture that a zero factor silences is not stored.
+Status plan_textures(SlotPlanner& slots, const gltf::Material& in, Material& out) {
+  const bool specular = out.specular > 0, reflects = specular || out.metallic > 0 || in.more.transmission > 0;
+  const bool emits = out.emissive[0] > 0 || out.emissive[1] > 0 || out.emissive[2] > 0;
+  const bool glossy = out.roughness > 0 || out.metallic > 0;
+  SHOAL_RETURN_IF_ERROR(slots.slot(in.base_color_texture, true, true, out.base_color_texture));
+  if (in.more.unlit) return {};
+  SHOAL_RETURN_IF_ERROR(
+      slots.slot(in.metallic_roughness_texture, reflects && glossy, false, out.metallic_roughness_texture));
+  SHOAL_RETURN_IF_ERROR(slots.slot(in.normal_texture, out.normal_scale != 0, false, out.normal_texture));
+  SHOAL_RETURN_IF_ERROR(slots.slot(in.emissive_texture, emits, true, out.emissive_texture));
+  SHOAL_RETURN_IF_ERROR(slots.slot(in.specular_texture, specular, false, out.specular_texture));
+  return slots.slot(in.specular_color_texture, specular, true, out.specular_color_texture);
+}
 
-  Status plan(uint32_t material, Material& out) {
-    material_ = material;
-    const gltf::Material& in = document_.materials[material_];
-    // A texture that a zero factor silences is not stored.
-    const bool specular = out.specular > 0, reflects = specular || out.metallic > 0;
-    const bool emits = out.emissive[0] > 0 || out.emissive[1] > 0 || out.emissive[2] > 0;
-    const bool glossy = out.roughness > 0 || out.metallic > 0;
-    SHOAL_RETURN_IF_ERROR(slot(in.base_color_texture, true, true, out.base_color_texture));
-    SHOAL_RETURN_IF_ERROR(
-        slot(in.metallic_roughness_texture, reflects && glossy, false, out.metallic_roughness_texture));
-    SHOAL_RETURN_IF_ERROR(slot(in.normal_texture, out.normal_scale != 0, false, out.normal_texture));
-    SHOAL_RETURN_IF_ERROR(slot(in.emissive_texture, emits, true, out.emissive_texture));
-    SHOAL_RETURN_IF_ERROR(slot(in.specular_texture, specular, false, out.specular_texture));
-    SHOAL_RETURN_IF_ERROR(slot(in.specular_color_texture, specular, true, out.specular_color_texture));
-    if (out.coverage != CoverageMode::kOpaque && out.base_color_texture.texture != kNoIndex) {
-      plan_.textures[out.base_color_texture.texture].needs_alpha = true;
-    }
-    return {};
+void note_effects(Material& out, const MaterialPlan& plan) {
+  if (out.normal_texture.texture != kNoIndex) out.effects |= kEffectNormalMap;
+  bool transformed = false;
+  for (const TextureSlot& s : {out.base_color_texture, out.metallic_roughness_texture, out.normal_texture,
+                               out.emissive_texture, out.specular_texture, out.specular_color_texture}) {
+    transformed = transformed || s.transform != 0;
   }
+  if (out.layers != kNoIndex) transformed = transformed || has_transform(plan.layers[out.layers]);
+  if (transformed) out.effects |= kEffectTextureTransform;
+}
 
- private:
-  Status slot(const std::optional<gltf::TextureInfo>& info, bool wanted, bool srgb, TextureSlot& out) {
-    if (!info || !wanted) return {};
-    const gltf::Texture& texture = document_.textures[info->texture];
-    if (!texture.image) {
-      plan_.warnings.push_back(
-          fmt::format("{}: textures[{}] has no image that can be read; its factor is used alone",
-                      material_name(document_, material_), info->texture));
-      return {};
-    }
-    SHOAL_ASSIGN_OR_RETURN(out.uv_set, uv_set(info->texcoord));
-    out.texture = request(texture, srgb);
-    return {};
+Status plan_material(SlotPlanner& slots, const gltf::Material& in, MaterialPlan& plan, Material& out) {
+  SHOAL_RETURN_IF_ERROR(plan_textures(slots, in, out));
+  SHOAL_RETURN_IF_ERROR(plan_layers(slots, in, plan, out));
+  note_effects(out, plan);
+  if (out.coverage != CoverageMode::kOpaque && out.base_color_texture.texture != kNoIndex) {
+    plan.textures[out.base_color_texture.texture].needs_alpha = true;
   }
-
-  Result<uint32_t> uv_set(uint32_t texcoord) {
-    MaterialUvSets& sets = plan_.uv_sets[material_];
-    for (uint32_t i = 0; i < sets.count; ++i) {
-      if (sets.texcoord[i] == texcoord) return i;
-    }
-    if (sets.count == kMaxUvSets) {
-      return Error{ErrorCode::kInput, fmt::format("{}: {}: expected at most {} texture coordinate sets, found more",
-                                                  document_.path, material_name(document_, material_), kMaxUvSets)};
-    }
-    sets.texcoord[sets.count] = texcoord;
-    return sets.count++;
-  }
-
-  uint32_t request(const gltf::Texture& texture, bool srgb) {
-    const gltf::Sampler sampler = texture.sampler ? document_.samplers[*texture.sampler] : gltf::Sampler{};
-    TextureRequest wanted;
-    wanted.image = *texture.image;
-    wanted.srgb = srgb;
-    wanted.wrap_u = wrap_mode(sampler.wrap_s), wanted.wrap_v = wrap_mode(sampler.wrap_t);
-    wanted.nearest = sampler.nearest_magnification;
-    const Key key{wanted.image, srgb, wanted.wrap_u, wanted.wrap_v, wanted.nearest};
-    const auto [found, added] = known_.try_emplace(key, static_cast<uint32_t>(plan_.textures.size()));
-    if (!added) return found->second;
-    wanted.user = material_name(document_, material_);
-    plan_.textures.push_back(std::move(wanted));
-    return found->second;
-  }
-
-  using Key = std::tuple<uint32_t, bool, WrapMode, WrapMode, bool>;
-  const gltf::Document& document_;
-  MaterialPlan& plan_;
-  uint32_t material_ = 0;
-  std::map<Key, uint32_t> known_;
-};
+  return {};
+}
 
 /// Alpha that is 1 everywhere is no alpha: exporters often write BLEND for opaque surfaces.
 bool covers_all(const Material& material, const std::vector<TextureFacts>& textures, bool vertex_alpha) {
@@ -162,7 +110,8 @@ Result<MaterialPlan> plan_materials(const gltf::Document& document, const std::v
   SlotPlanner slots(document, plan);
   for (uint32_t m = 0; m < document.materials.size(); ++m) {
     Material material = convert_factors(document.materials[m]);
-    if (uses[m].used) SHOAL_RETURN_IF_ERROR(slots.plan(m, material));
+    slots.begin(m);
+    if (uses[m].used) SHOAL_RETURN_IF_ERROR(plan_material(slots, document.materials[m], plan, material));
     plan.materials.push_back(material);
   }
   if (uses.back().used) {

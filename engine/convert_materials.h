@@ -42,6 +42,8 @@ struct TextureRequest {
 
 struct MaterialPlan {
   std::vector<Material> materials;      ///< document order; the default material last, if used
+  std::vector<MaterialLayers> layers;   ///< of the materials that call for some, in their order
+  std::vector<TextureTransform> transforms;  ///< each once
   std::vector<MaterialUvSets> uv_sets;  ///< parallel
   std::vector<TextureRequest> textures;
   std::vector<std::string> warnings;
@@ -59,7 +61,7 @@ struct TextureFacts {
 };
 
 /// `uses` has one element a document material and one more for the default material.
-/// Fails with: kInput (more than kMaxUvSets texture coordinate sets in a material).
+/// Fails with: kInput (more than kMaxUvSets texture coordinate sets in a material, too many texture transforms).
 Result<MaterialPlan> plan_materials(const gltf::Document& document, const std::vector<MaterialUse>& uses);
 
 void finish_materials(MaterialPlan& plan, const std::vector<TextureFacts>& textures,

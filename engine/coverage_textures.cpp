@@ -4,7 +4,8 @@
 
 namespace shoal {
 
-void CoverageTextures::set_materials(const std::vector<Material>& materials, const std::vector<Texture>& textures) {
+void CoverageTextures::set_materials(const std::vector<Material>& materials, const std::vector<Texture>& textures,
+                                     const std::vector<TextureTransform>& transforms) {
   coverage_.clear();
   for (const Material& material : materials) {
     MaterialCoverage c;
@@ -17,6 +18,10 @@ void CoverageTextures::set_materials(const std::vector<Material>& materials, con
       c.uv_set = material.base_color_texture.uv_set;
       c.wrap_u = textures[texture].wrap_u, c.wrap_v = textures[texture].wrap_v;
       c.nearest = textures[texture].nearest != 0;
+      if (const uint16_t row = material.base_color_texture.transform; row != 0) {
+        c.transformed = true;
+        std::copy_n(transforms[row - 1].m, 6, c.uv_transform);
+      }
     }
     coverage_.push_back(c);
   }

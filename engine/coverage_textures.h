@@ -22,7 +22,8 @@ class CoverageTextures : public CoverageSource {
   /// Level after level, finest first.
   void add_level(uint32_t texture, AlphaLevel&& level) { levels_[texture].push_back(std::move(level)); }
   /// Requires: every texture of a material that is not opaque has its levels or is opaque.
-  void set_materials(const std::vector<Material>& materials, const std::vector<Texture>& textures);
+  void set_materials(const std::vector<Material>& materials, const std::vector<Texture>& textures,
+                     const std::vector<TextureTransform>& transforms);
   uint64_t resident_bytes() const;
 
   MaterialCoverage coverage(uint32_t material) const override { return coverage_[material]; }

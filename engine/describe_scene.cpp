@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "engine/effects.h"
+
 namespace shoal {
 
 namespace {
@@ -100,6 +102,10 @@ std::string scene_description_text(const Scene& scene) {
   append_line(text, "bounds",
               fmt::format("({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", h.bounds_lo[0], h.bounds_lo[1],
                           h.bounds_lo[2], h.bounds_hi[0], h.bounds_hi[1], h.bounds_hi[2]));
+  if (build.contains("options") && build["options"].contains("variant") && build["options"]["variant"].is_string()) {
+    append_line(text, "variant", build["options"]["variant"].get<std::string>());
+  }
+  text += "\neffects plan\n" + effects_plan_text(effects_plan(scene, {}));
   return text;
 }
 
@@ -137,6 +143,12 @@ std::string scene_description_json(const Scene& scene) {
                {"bounds_hi", h.bounds_hi},
                {"names", parsed(scene.names)},
                {"build", parsed(scene.build_record)}};
+  Json effects = Json::array();
+  for (const EffectState& e : effects_plan(scene, {})) {
+    effects.push_back({{"name", e.name}, {"extension", e.extension}, {"on", e.on},
+                       {"materials_count", e.materials_count}, {"first_material", e.first_material}});
+  }
+  json["effects"] = effects;
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

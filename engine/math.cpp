@@ -108,4 +108,18 @@ float linear_to_srgb(float linear) {
   return static_cast<float>(1.055 * exp2_bounded(log2_positive(linear) / 2.4) - 0.055);
 }
 
+float log2_of(float x) { return static_cast<float>(log2_positive(x)); }
+
+float exp2_of(float x) {
+  if (!(x >= -126)) return 0;
+  return static_cast<float>(exp2_bounded(std::fmin(x, 127.0f)));
+}
+
+float power_of(float x, float y) {
+  if (!(x > 0)) return 0;
+  const double exponent = static_cast<double>(y) * log2_positive(x);
+  if (!(exponent >= -126)) return 0;
+  return static_cast<float>(exp2_bounded(std::fmin(exponent, 127.0)));
+}
+
 }  // namespace shoal

@@ -20,6 +20,12 @@ float arc_cosine(float x);
 /// the linear part.
 float srgb_to_linear(float encoded);
 float linear_to_srgb(float linear);
+/// log2 of a positive number, relative error below 2^-20 or absolute below 2^-20. Requires: x > 0, finite.
+float log2_of(float x);
+/// 2^x, relative error below 2^-22; 0 below -126, 2^127 above 127.
+float exp2_of(float x);
+/// x^y for x >= 0, with the same care: 0 for x = 0.
+float power_of(float x, float y);
 /// x^5 by multiplication (Schlick).
 inline float power5(float x) { return (x * x) * (x * x) * x; }
 

@@ -36,6 +36,7 @@ constexpr uint64_t kReadAheadShare = 16;
 constexpr unsigned kLeastReadDepth = 4;
 /// Shading tables of any scene: directional albedo, structures.
 constexpr uint64_t kSmallTableBytes = 256 * 1024;
+constexpr uint64_t kLobeTableBytes = 512 * 1024;  // engine/lobe_tables.h, for scenes with layers
 constexpr uint64_t kFloatPixelBytes = 4 * sizeof(float);
 
 /// What is known of a scene before or after its tables are read.
@@ -215,13 +216,15 @@ Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, cons
   }
   for (const TableId table : {tables::kBuildRecord, tables::kSceneHeader, tables::kTreelets, tables::kMaterials,
                               tables::kTextures, tables::kEmitters, tables::kLights, tables::kCameras, tables::kNames,
-                              tables::kSourceFiles}) {
+                              tables::kSourceFiles, tables::kMaterialLayers, tables::kTextureTransforms}) {
     sizes.table_bytes += size_of(file, table);
   }
   const uint64_t emitters = size_of(file, tables::kEmitters) / sizeof(Emitter);
   const uint64_t entries = size_of(file, tables::kEntries) / sizeof(TreeletEntry);
   const uint64_t directory = file.records().size_bytes();
   sizes.table_bytes += directory + entries * sizeof(uint32_t) + emitters * sizeof(double) + kSmallTableBytes;
+  const bool layers = size_of(file, tables::kMaterialLayers) > 0 || (picture.shading.effects.on & kLayerEffects) != 0;
+  if (layers) sizes.table_bytes += kLobeTableBytes;
   sizes.reading_bytes = std::max<uint64_t>(kTablePageBytes + 2 * kPageAlignment, emitters * sizeof(double));
   const EnvironmentOptions& environment = picture.shading.environment;
   if (environment.kind == EnvironmentOptions::Kind::kImage) {

@@ -32,4 +32,25 @@ struct Ggx {
   Vec3 sample_visible_normal(const Vec3& wo, float u1, float u2) const;
 };
 
+/// The same stretched along x and y (Heitz 2014, eq. 85 and 86).
+struct GgxAnisotropic {
+  float alpha_x, alpha_y;
+
+  float d(const Vec3& h) const {
+    const float x = h.x / alpha_x, y = h.y / alpha_y;
+    const float k = x * x + y * y + h.z * h.z;
+    return 0.31830988618379067f / (alpha_x * alpha_y * k * k);
+  }
+  float lambda(const Vec3& w) const {
+    const float x = alpha_x * w.x, y = alpha_y * w.y;
+    return 0.5f * (std::sqrt(1 + (x * x + y * y) / (w.z * w.z)) - 1);
+  }
+  Vec3 sample_visible_normal(const Vec3& wo, float u1, float u2) const;
+};
+
+/// KHR_materials_anisotropy: rougher along x, by mix(alpha, 1, strength^2).
+inline GgxAnisotropic anisotropic_ggx(float alpha, float strength) {
+  return {alpha + strength * strength * (1 - alpha), alpha};
+}
+
 }  // namespace shoal

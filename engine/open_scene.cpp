@@ -73,6 +73,10 @@ Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions t
   scene.header = headers[0];
   SHOAL_ASSIGN_OR_RETURN(scene.treelets, read_rows<TreeletPages>(file, tables::kTreelets, "treelets"));
   SHOAL_ASSIGN_OR_RETURN(scene.materials, read_rows<Material>(file, tables::kMaterials, "materials"));
+  SHOAL_ASSIGN_OR_RETURN(scene.material_layers,
+                         read_rows<MaterialLayers>(file, tables::kMaterialLayers, "material layers"));
+  SHOAL_ASSIGN_OR_RETURN(scene.texture_transforms,
+                         read_rows<TextureTransform>(file, tables::kTextureTransforms, "texture transforms"));
   SHOAL_ASSIGN_OR_RETURN(scene.textures, read_rows<Texture>(file, tables::kTextures, "textures"));
   SHOAL_ASSIGN_OR_RETURN(scene.emitters, read_rows<Emitter>(file, tables::kEmitters, "emitters"));
   SHOAL_ASSIGN_OR_RETURN(scene.lights, read_rows<PunctualLight>(file, tables::kLights, "lights"));
@@ -89,7 +93,8 @@ Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions t
 
 uint64_t Scene::resident_bytes() const {
   const auto bytes = [](const auto& rows) { return uint64_t{rows.capacity()} * sizeof(rows[0]); };
-  return top_tree.resident_bytes() + bytes(treelets) + bytes(materials) + bytes(textures) + bytes(emitters) +
+  return top_tree.resident_bytes() + bytes(treelets) + bytes(materials) + bytes(material_layers) +
+         bytes(texture_transforms) + bytes(textures) + bytes(emitters) +
          bytes(lights) + bytes(cameras) + bytes(entries_by_treelet) + bytes(build_record) + bytes(names) +
          bytes(source_files) +
          file->records().size_bytes();

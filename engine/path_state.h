@@ -27,10 +27,16 @@ struct PathState {
   Vec3 origin{0};
   std::atomic<uint32_t> pending{0};  ///< rays of this vertex still travelling
   Vec3 direction{0};
-  uint32_t reserved = 0;
+  uint32_t medium = 0;               ///< PathMedium: what volume the ray travels in
   Hit hit;
 };
 static_assert(sizeof(PathState) == 112);
+
+/// PathState::medium: the material of the volume + 1, or 0 in the open; the shader's.
+enum PathMedium : uint32_t {
+  kPathMediumMask = 0x7fffffffu,
+  kPathOneWavelength = 0x80000000u,  ///< its throughput is that of one wavelength
+};
 
 enum PathFlags : uint32_t {
   kPathGoesOn = 1,   ///< the vertex sampled a bounce: its ray travels or has come home

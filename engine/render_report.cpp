@@ -119,6 +119,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"bounces", picture.shading.bounces},
           {"seed", picture.shading.seed},
           {"environment", environment_text(picture.shading.environment)},
+          {"effects", effects_text(picture.shading.effects)},
           {"order", order_name(result.order.order)},
           {"order_asked", order_name(execution.order)},
           {"order_reason", result.order.reason},

@@ -88,6 +88,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.flags = kPathGoesOn;
   path.throughput = Vec3(1);
   path.bsdf_pdf = 0;
+  path.medium = 0;
   path.radiance = Vec3(0);
   path.shadow_radiance = Vec3(0);
   const uint64_t seed = context_.picture.shading.seed;

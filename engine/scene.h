@@ -18,6 +18,8 @@ struct Scene {
   TopTree top_tree;
   std::vector<TreeletPages> treelets;
   std::vector<Material> materials;
+  std::vector<MaterialLayers> material_layers;
+  std::vector<TextureTransform> texture_transforms;
   std::vector<Texture> textures;
   std::vector<Emitter> emitters;
   std::vector<PunctualLight> lights;

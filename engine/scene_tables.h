@@ -24,10 +24,12 @@ inline constexpr TableId kLights = 10;       ///< PunctualLight[]
 inline constexpr TableId kCameras = 11;      ///< CameraRecord[]
 inline constexpr TableId kNames = 12;        ///< JSON: names of materials, cameras, lights, for messages
 inline constexpr TableId kSourceFiles = 13;  ///< engine/source_files.h; absent from files of earlier versions
+inline constexpr TableId kMaterialLayers = 14;     ///< MaterialLayers[]
+inline constexpr TableId kTextureTransforms = 15;  ///< TextureTransform[]
 }  // namespace tables
 
 struct SceneHeader {
-  uint32_t version = 2;
+  uint32_t version = 3;
   uint32_t treelet_bytes = 0;        ///< --treelet-size of the build
   uint64_t triangles_count = 0;      ///< stored, an instanced mesh once
   uint64_t instanced_triangles_count = 0;
@@ -51,12 +53,36 @@ struct TreeletPages {
 
 struct TextureSlot {
   uint32_t texture = kNoIndex;  ///< kNoIndex: none, the factor alone
-  uint32_t uv_set = 0;          ///< of CornerAttributes::uv
+  uint16_t uv_set = 0;          ///< of CornerAttributes::uv
+  uint16_t transform = 0;       ///< row + 1 of the texture transforms; 0: none
+};
+
+/// KHR_texture_transform: u' = m[0] u + m[1] v + m[2], v' = m[3] u + m[4] v + m[5].
+struct TextureTransform {
+  float m[6];
 };
 
 enum MaterialFlags : uint32_t {
   kMaterialEmits = 1,      ///< emissive factor > 0 in some channel
 };
+
+/// What a material calls for beyond the factors and textures of every material. The bits of kLayerEffects need a
+/// row of MaterialLayers; a material without them is shaded by the plain code (engine/bsdf.h).
+enum MaterialEffects : uint32_t {
+  kEffectTransmission = 1u << 0,         ///< light passes the surface: thin-walled, or refracted into a volume
+  kEffectVolume = 1u << 1,               ///< the surface bounds a volume: refraction and absorption
+  kEffectDispersion = 1u << 2,
+  kEffectDiffuseTransmission = 1u << 3,
+  kEffectClearcoat = 1u << 4,
+  kEffectSheen = 1u << 5,
+  kEffectAnisotropy = 1u << 6,
+  kEffectIridescence = 1u << 7,
+  kEffectUnlit = 1u << 8,                ///< shows its base colour, scatters nothing; no row
+  kEffectNormalMap = 1u << 9,            ///< no row
+  kEffectTextureTransform = 1u << 10,    ///< of some texture; no row
+};
+inline constexpr uint32_t kLayerEffects = 0xff;
+inline constexpr uint32_t kAllMaterialEffects = 0x7ff;
 
 struct Material {
   float base_color[4];
@@ -74,8 +100,32 @@ struct Material {
   uint8_t reserved8[3];
   TextureSlot base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture, specular_texture,
       specular_color_texture;
-  uint32_t reserved[4];
+  uint32_t effects;  ///< MaterialEffects
+  uint32_t layers;   ///< row of the material layers; kNoIndex: none
+  uint32_t reserved[2];
 };
+static_assert(sizeof(Material) == 140);
+
+/// The parameters of a material's layers, for materials that have some. The values here change nothing.
+struct MaterialLayers {
+  float ior = 1.5f;
+  float transmission = 0;
+  float dispersion = 0;  ///< 20 / Abbe number
+  uint32_t volume = 0;   ///< 1: the surface bounds a volume, 0: it is thin-walled
+  float absorption[3] = {0, 0, 0};  ///< log2 of what a world unit of the volume lets pass, <= 0
+  float clearcoat = 0, clearcoat_roughness = 0, clearcoat_normal_scale = 1;
+  float sheen_color[3] = {0, 0, 0};
+  float sheen_roughness = 0;
+  float anisotropy = 0, anisotropy_cos = 1, anisotropy_sin = 0;  ///< strength, and its rotation from the tangent
+  float iridescence = 0, iridescence_ior = 1.3f, film_minimum = 100, film_maximum = 400;  ///< thickness in nm
+  float diffuse_transmission = 0;
+  float diffuse_transmission_color[3] = {1, 1, 1};
+  TextureSlot transmission_texture, clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture,
+      sheen_color_texture, sheen_roughness_texture, anisotropy_texture, iridescence_texture, film_texture,
+      diffuse_transmission_texture, diffuse_transmission_color_texture;
+  uint32_t reserved = 0;
+};
+static_assert(sizeof(MaterialLayers) == 192);
 
 inline constexpr uint32_t kTextureTileTexels = 64;  ///< a tile is 64 x 64 RGBA8: 16 KiB decoded
 inline constexpr uint32_t kMaxTextureLevels = 17;   ///< 65536 texels a side

@@ -3,7 +3,8 @@
 #include <cmath>
 
 #include "engine/bsdf.h"
-#include "engine/material_sample.h"
+#include "engine/dispersion.h"
+#include "engine/math.h"
 #include "engine/sampler.h"
 #include "engine/shading_tables.h"
 #include "engine/surface.h"
@@ -34,6 +35,13 @@ double uniform53(uint32_t high, uint32_t low) {
   return static_cast<double>((static_cast<uint64_t>(high) << 32 | low) >> 11) * 0x1p-53;
 }
 
+/// The normal on the side of the surface that `direction` leaves to.
+template <class AnyBsdf>
+Vec3 side_of(const Vec3& normal, const Vec3& direction) {
+  if constexpr (AnyBsdf::kTransmits) return glm::dot(normal, direction) < 0 ? -normal : normal;
+  return normal;
+}
+
 }  // namespace
 
 Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
@@ -47,26 +55,44 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   ++counters.vertices_shaded_count;
   const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes);
   const Material& material = scene_->materials[surface.attributes.material];
+  const uint32_t effects = options_->effects.of(material.effects);
+  if (((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {
+    absorb(path, surface, surface.attributes.material, effects);
+  }
+  if ((effects & material.effects & kEffectUnlit) != 0) {
+    return add_unlit(path, surface, material, counters, cache_counters);
+  }
   if ((material.flags & kMaterialEmits) != 0) {
     SHOAL_RETURN_IF_ERROR(add_emission(path, surface, material, counters, cache_counters));
   }
   if (path.bounce >= options_->bounces) return {};
+  if ((effects & kLayerEffects) != 0) {
+    return shade_layers(path, surface, material, effects, result, counters, cache_counters);
+  }
 
-  TextureContext context{textures_, cache_counters, counters.texture_lookups_count};
-  SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, context));
-  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, context));
+  TextureContext textures = context(counters, cache_counters);
+  const bool mapped = (options_->effects.off & kEffectNormalMap) == 0;
+  SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, textures));
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, mapped, textures));
   const Bsdf bsdf(values, tables_->impl().energy_table(), surface.geometric_normal, normal, surface.wo);
   if (bsdf.black()) return {};
-  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, result, counters, cache_counters));
-  sample_bounce(path, surface, bsdf, result);
+  const Sides media{path.medium & kPathMediumMask, 0};
+  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, counters, cache_counters));
+  sample_bounce(path, surface, bsdf, media, result);
   return {};
+}
+
+TextureContext Shader::context(ShadeCounters& counters, CacheCounters& cache_counters) {
+  const bool moved = (options_->effects.off & kEffectTextureTransform) == 0;
+  return {textures_, cache_counters, counters.texture_lookups_count,
+          moved ? std::span<const TextureTransform>(scene_->texture_transforms) : std::span<const TextureTransform>()};
 }
 
 Status Shader::add_emission(PathState& path, const Surface& surface, const Material& material,
                             ShadeCounters& counters, CacheCounters& cache_counters) {
-  TextureContext context{textures_, cache_counters, counters.texture_lookups_count};
+  TextureContext textures = context(counters, cache_counters);
   SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
-                         sample_emission(material, surface.uv(material.emissive_texture.uv_set), context));
+                         sample_emission(material, surface.uv(material.emissive_texture.uv_set), textures));
   float weight = 1;
   const double area_pdf = tables_->impl().lights->emitter_pdf(material);
   if (path.bsdf_pdf > 0 && area_pdf > 0) {
@@ -78,8 +104,9 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
   return {};
 }
 
-Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result,
-                            ShadeCounters& counters, CacheCounters& cache_counters) {
+template <class AnyBsdf>
+Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
+                            ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters) {
   const LightSampler& lights = *tables_->impl().lights;
   if (lights.empty()) return {};
   const Random4 random = path_random(path, options_->seed, Dimension::kLight);
@@ -91,10 +118,15 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
 
   Vec3 radiance = light.radiance;
   if (light.emitter != nullptr) {
-    TextureContext context{textures_, cache_counters, counters.texture_lookups_count};
+    TextureContext textures = context(counters, cache_counters);
     SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
-                           sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, context));
+                           sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, textures));
     radiance *= emission;
+  }
+  const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, light.direction);
+  const uint32_t medium = side == surface.geometric_normal ? media.above : media.below;
+  if (medium != 0 && !light.at_infinity) {
+    radiance *= transmittance(medium, glm::length(light.target.point - surface.position.point));
   }
   const float weight = light.delta ? 1.0f : mis_weight(light.pdf, f.pdf);
   add_radiance(path.shadow_radiance, path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf),
@@ -102,7 +134,7 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
   if (path.shadow_radiance == Vec3(0)) return {};
 
   result.has_shadow = true;
-  result.shadow_origin = offset_point(surface.position, surface.geometric_normal);
+  result.shadow_origin = offset_point(surface.position, side);
   if (light.at_infinity) {
     result.shadow_direction = light.direction;
     result.shadow_t_max = kRayInfinity;
@@ -115,7 +147,9 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const Bsdf&
   return {};
 }
 
-void Shader::sample_bounce(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result) const {
+template <class AnyBsdf>
+void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
+                           ShadeResult& result) const {
   // After the last scattering a bounce can only find emission.
   if (path.bounce + 1 >= options_->bounces && !tables_->impl().lights_hit_by_chance) return;
   const Random4 random = path_random(path, options_->seed, Dimension::kBsdf);
@@ -131,8 +165,76 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const Bsdf& 
   path.bsdf_pdf = sample.pdf;
   ++path.bounce;
   result.has_bounce = true;
-  result.bounce_origin = offset_point(surface.position, surface.geometric_normal);
+  const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, sample.direction);
+  if constexpr (AnyBsdf::kTransmits) {
+    const uint32_t medium = side == surface.geometric_normal ? media.above : media.below;
+    const bool one = bsdf.of_one_wavelength(sample.direction);
+    path.medium = medium | (path.medium & kPathOneWavelength) | (one ? kPathOneWavelength : 0u);
+  }
+  result.bounce_origin = offset_point(surface.position, side);
   result.bounce_direction = sample.direction;
+}
+
+const MaterialLayers& Shader::layers_of(const Material& material) const {
+  static constexpr MaterialLayers kNone;  // of a material that an effect is forced on for
+  return (material.effects & kLayerEffects) != 0 ? scene_->material_layers[material.layers] : kNone;
+}
+
+Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
+                         CacheCounters& cache_counters) {
+  TextureContext textures = context(counters, cache_counters);
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 color, sample_base_color(material, surface, textures));
+  add_radiance(path.radiance, path.throughput * color, counters);
+  return {};
+}
+
+Vec3 Shader::transmittance(uint32_t medium, float distance) const {
+  const float* absorption = layers_of(scene_->materials[medium - 1]).absorption;
+  return {exp2_of(absorption[0] * distance), exp2_of(absorption[1] * distance), exp2_of(absorption[2] * distance)};
+}
+
+void Shader::absorb(PathState& path, const Surface& surface, uint32_t material, uint32_t effects) const {
+  uint32_t medium = path.medium & kPathMediumMask;
+  // A camera inside a volume sees its boundary from behind.
+  if (path.bounce == 0 && (effects & kEffectVolume) != 0 && !surface.front &&
+      layers_of(scene_->materials[material]).volume != 0) {
+    path.medium = medium = material + 1;
+  }
+  if (medium != 0) path.throughput *= transmittance(medium, glm::length(surface.position.point - path.origin));
+}
+
+void Shader::disperse(const PathState& path, const MaterialLayers& layers, LayeredSample& values) const {
+  if (!(layers.dispersion > 0) || !values.volume || !(values.transmission > 0)) return;
+  // A path has one wavelength, whatever it meets.
+  const float u = random4(options_->seed, path.pixel, path.sample, 0, Dimension::kWavelength).uniform(0);
+  const float nanometres = kShortestWave + (kLongestWave - kShortestWave) * u;
+  values.ior = dispersed_ior(layers.ior, layers.dispersion, nanometres);
+  values.disperses = true;
+  if ((path.medium & kPathOneWavelength) == 0) values.wavelength_weight = wavelength_weight(nanometres);
+}
+
+Status Shader::shade_layers(PathState& path, const Surface& surface, const Material& material, uint32_t effects,
+                            ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters) {
+  TextureContext textures = context(counters, cache_counters);
+  const uint32_t mapped = ~options_->effects.off & kEffectNormalMap;
+  LayeredSample values;
+  SHOAL_ASSIGN_OR_RETURN(static_cast<MaterialSample&>(values), sample_material(material, surface, textures));
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, mapped != 0, textures));
+  const MaterialLayers& layers = layers_of(material);
+  SHOAL_RETURN_IF_ERROR(
+      sample_layers(layers, material, (effects & kLayerEffects) | mapped, surface, textures, values));
+  if ((effects & kEffectDispersion) != 0) disperse(path, layers, values);
+
+  const LayeredBsdf bsdf(values, tables_->impl().lobe_tables(), surface.geometric_normal, normal, surface.wo);
+  if (bsdf.black()) return {};
+  const uint32_t medium = path.medium & kPathMediumMask, inside = surface.attributes.material + 1;
+  Sides media{medium, medium};
+  if (values.volume && (values.transmission > 0 || values.diffuse_transmission > 0)) {
+    media = values.outside ? Sides{medium, inside} : Sides{inside, 0};
+  }
+  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, counters, cache_counters));
+  sample_bounce(path, surface, bsdf, media, result);
+  return {};
 }
 
 void Shader::shade_miss(PathState& path, ShadeCounters& counters) {

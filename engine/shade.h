@@ -8,15 +8,14 @@
 #include <span>
 #include <string>
 
+#include "engine/effects.h"
 #include "engine/path_state.h"
+#include "engine/material_sample.h"
 #include "engine/scene.h"
 #include "engine/texture_sample.h"
 #include "io/page_cache.h"
 
 namespace shoal {
-
-class Bsdf;
-struct Surface;
 
 /// --environment: constant radiance or an equirectangular picture (glTF axes: +y up; u = 0.5 looks along -z).
 struct EnvironmentOptions {
@@ -35,6 +34,7 @@ struct ShadingOptions {
   uint32_t roulette_start = 3;  ///< the first vertex at which Russian roulette may end a path
   uint64_t seed = 0;
   EnvironmentOptions environment;
+  EffectChoice effects;
 };
 
 /// Tables shared by all threads: light sampling distributions, environment map and its distribution, directional
@@ -87,9 +87,27 @@ class Shader {
  private:
   Status add_emission(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
                       CacheCounters& cache_counters);
-  Status sample_light(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result,
-                      ShadeCounters& counters, CacheCounters& cache_counters);
-  void sample_bounce(PathState& path, const Surface& surface, const Bsdf& bsdf, ShadeResult& result) const;
+  Status add_unlit(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
+                   CacheCounters& cache_counters);
+  /// Light and bounce of a material with layers; `effects` is what it is shaded with.
+  Status shade_layers(PathState& path, const Surface& surface, const Material& material, uint32_t effects,
+                      ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
+  void disperse(const PathState& path, const MaterialLayers& layers, LayeredSample& values) const;
+  /// What the volume that `medium` names lets pass over a distance.
+  Vec3 transmittance(uint32_t medium, float distance) const;
+  void absorb(PathState& path, const Surface& surface, uint32_t material, uint32_t effects) const;
+  /// `medium` is that of the scattered ray, on either side of the surface.
+  struct Sides {
+    uint32_t above = 0, below = 0;
+  };
+  template <class AnyBsdf>
+  Status sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
+                      ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
+  template <class AnyBsdf>
+  void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
+                     ShadeResult& result) const;
+  TextureContext context(ShadeCounters& counters, CacheCounters& cache_counters);
+  const MaterialLayers& layers_of(const Material& material) const;
 
   const Scene* scene_;
   const ShadingTables* tables_;

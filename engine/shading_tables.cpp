@@ -29,14 +29,23 @@ Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, con
   impl->lights_hit_by_chance = !impl->environment.black();
   for (const Material& material : scene.materials) {
     if ((material.flags & kMaterialEmits) != 0) impl->lights_hit_by_chance = true;
+    // An unlit surface shines towards whoever sees it.
+    if ((options.effects.of(material.effects) & kEffectUnlit) != 0) impl->lights_hit_by_chance = true;
     if (has_specular_lobe(material) && !impl->energy) impl->energy.emplace();
   }
+  const uint32_t called = effects_called_for(scene, options.effects);
+  if ((called & kLayerEffects) != 0 && !impl->energy) impl->energy.emplace();
+  if ((called & kEffectVolume) != 0 && (called & kEffectTransmission) != 0) impl->glass.emplace();
+  if ((called & kEffectSheen) != 0) impl->sheen.emplace();
+  if ((called & kEffectAnisotropy) != 0) impl->anisotropy.emplace();
   return std::unique_ptr<ShadingTables>(new ShadingTables(std::move(impl)));
 }
 
 uint64_t ShadingTables::resident_bytes() const {
   return sizeof(Impl) + impl_->environment.resident_bytes() + impl_->lights->resident_bytes() +
-         (impl_->energy ? impl_->energy->resident_bytes() : 0);
+         (impl_->energy ? impl_->energy->resident_bytes() : 0) + (impl_->glass ? impl_->glass->resident_bytes() : 0) +
+         (impl_->sheen ? impl_->sheen->resident_bytes() : 0) +
+         (impl_->anisotropy ? impl_->anisotropy->resident_bytes() : 0);
 }
 
 bool ShadingTables::has_lights() const { return !impl_->lights->empty(); }

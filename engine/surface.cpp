@@ -32,10 +32,6 @@ Vec3 interpolated_normal(const Surface& s, const Instance& instance) {
   return unit_or_zero(instance.identity != 0 ? normal : instance.world_to_object.transposed_vector(normal));
 }
 
-struct TangentFrame {
-  Vec3 tangent{0}, bitangent{0};
-};
-
 void set_tangent(Surface& s, const Instance& instance) {
   const CornerAttributes* c = s.attributes.corner;
   const Vec4 tangent = interpolate(c[0].tangent, c[1].tangent, c[2].tangent, s.b1, s.b2);
@@ -52,10 +48,14 @@ TangentFrame corner_tangents(const Surface& s) {
 
 /// Tangent along +u from dP = (dP/du) du + (dP/dv) dv on two edges. glTF's v runs down the picture and its normal
 /// maps have +y up: the bitangent is on the side of -dP/dv (Mikkelsen 2008, section 3, with the two per face).
-TangentFrame uv_tangents(const Surface& s, uint32_t uv_set) {
+TangentFrame uv_tangents(const Surface& s, uint32_t uv_set, const float* m) {
   const CornerAttributes* c = s.attributes.corner;
-  const glm::dvec2 d1 = glm::dvec2(c[1].uv[uv_set]) - glm::dvec2(c[0].uv[uv_set]);
-  const glm::dvec2 d2 = glm::dvec2(c[2].uv[uv_set]) - glm::dvec2(c[0].uv[uv_set]);
+  glm::dvec2 d1 = glm::dvec2(c[1].uv[uv_set]) - glm::dvec2(c[0].uv[uv_set]);
+  glm::dvec2 d2 = glm::dvec2(c[2].uv[uv_set]) - glm::dvec2(c[0].uv[uv_set]);
+  if (m != nullptr) {
+    d1 = {double{m[0]} * d1.x + double{m[1]} * d1.y, double{m[3]} * d1.x + double{m[4]} * d1.y};
+    d2 = {double{m[0]} * d2.x + double{m[1]} * d2.y, double{m[3]} * d2.x + double{m[4]} * d2.y};
+  }
   const double area = d1.x * d2.y - d2.x * d1.y, sign = area < 0 ? -1 : 1;
   if (area == 0) return {};
   const DVec3 e1 = s.edge1, e2 = s.edge2;
@@ -107,13 +107,13 @@ Surface find_surface(const PathState& path, const Instance& instance, std::span<
   return s;
 }
 
-Vec3 map_normal(const Surface& s, const Vec3& n, uint32_t uv_set) {
-  TangentFrame frame;
-  if (s.tangent != Vec3(0)) {
-    frame = corner_tangents(s);
-  } else if (uv_set < 4) {
-    frame = uv_tangents(s, uv_set);
-  }
+TangentFrame tangent_frame(const Surface& s, uint32_t uv_set, const float* uv_transform) {
+  if (s.tangent != Vec3(0)) return corner_tangents(s);
+  return uv_set < 4 ? uv_tangents(s, uv_set, uv_transform) : TangentFrame{};
+}
+
+Vec3 map_normal(const Surface& s, const Vec3& n, uint32_t uv_set, const float* uv_transform) {
+  const TangentFrame frame = tangent_frame(s, uv_set, uv_transform);
   if (frame.tangent == Vec3(0)) return s.front_normal;
   const Vec3 mapped = unit_or_zero(frame.tangent * n.x + frame.bitangent * n.y + s.front_normal * n.z);
   return mapped == Vec3(0) ? s.front_normal : mapped;

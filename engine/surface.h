@@ -40,7 +40,16 @@ Surface find_surface(const PathState& path, const Instance& instance, std::span<
 /// The front normal bent by a tangent-space normal (glTF: x along the tangent, y along the bitangent, z out).
 /// Tangents come from the corners or, where those are zero, from the derivatives of uv set `uv_set` over the
 /// triangle, a face at a time; without either the front normal stays.
-Vec3 map_normal(const Surface& surface, const Vec3& tangent_space_normal, uint32_t uv_set);
+/// `uv_transform` (TextureTransform::m, or null) is what the uv are taken through before the picture is looked up: the
+/// derivatives follow it, so that relief turns with its texture.
+Vec3 map_normal(const Surface& surface, const Vec3& tangent_space_normal, uint32_t uv_set,
+                const float* uv_transform = nullptr);
+
+struct TangentFrame {
+  Vec3 tangent{0}, bitangent{0};  ///< unit; zero: none is known
+};
+/// Tangent and bitangent of the front face, as map_normal() has them.
+TangentFrame tangent_frame(const Surface& surface, uint32_t uv_set, const float* uv_transform = nullptr);
 
 /// The shading normal for the side seen: `front_normal` turned to it, then leaned towards the geometric normal as
 /// far as needed for dot(normal, wo) >= kMinViewRatio * dot(geometric normal, wo), so that no pixel of an

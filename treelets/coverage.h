@@ -28,6 +28,8 @@ struct MaterialCoverage {
   float cutoff = 0.5f;
   uint32_t texture = 0xffffffffu;  ///< kNoIndex: none
   uint32_t uv_set = 0;
+  bool transformed = false;        ///< the uv are moved first: u' = m[0] u + m[1] v + m[2], v' = m[3] u + m[4] v + m[5]
+  float uv_transform[6] = {1, 0, 0, 0, 1, 0};
   WrapMode wrap_u = WrapMode::kRepeat, wrap_v = WrapMode::kRepeat;
   bool nearest = false;            ///< the sampler magnifies without interpolation
 };

@@ -102,7 +102,12 @@ std::optional<CoveragePlan> CoverageCropper::plan(uint32_t triangle) const {
     }
     if (material.uv_set >= layout.uv_count) continue;
     const float* uv = corner + layout.uv_offset(material.uv_set);
-    if (all_finite(uv, 2)) u[c] = uv[0], v[c] = uv[1];
+    if (!all_finite(uv, 2)) continue;
+    u[c] = uv[0], v[c] = uv[1];
+    if (!material.transformed) continue;
+    const float* m = material.uv_transform;
+    u[c] = double{m[0]} * uv[0] + double{m[1]} * uv[1] + m[2];
+    v[c] = double{m[3]} * uv[0] + double{m[4]} * uv[1] + m[5];
   }
   if (material.texture == kNoIndex) return always_there(record) ? std::nullopt : std::optional(plan);
 

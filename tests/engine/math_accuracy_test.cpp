@@ -54,6 +54,27 @@ TEST(Math, ArcCosineStaysWithinItsBoundAndClampsItsArgument) {
   EXPECT_FLOAT_EQ(arc_cosine(-1.5f), kPi);
 }
 
+TEST(Math, LogarithmsExponentialsAndPowersStayWithinTheirBounds) {
+  double worst_log = 0, worst_exp = 0, worst_power = 0;
+  for (int i = 1; i < 100000; ++i) {
+    const float x = std::ldexp(1.0f + static_cast<float>(i % 997) / 997, i % 200 - 100);
+    const double l = std::log2(static_cast<double>(x));
+    worst_log = std::max(worst_log, std::abs(log2_of(x) - l) / std::max(1.0, std::abs(l)));
+    const float y = static_cast<float>(i - 50000) / 400;
+    worst_exp = std::max(worst_exp, std::abs(exp2_of(y) / std::exp2(static_cast<double>(y)) - 1));
+    const float base = static_cast<float>(i) / 100000;
+    const double power = std::pow(static_cast<double>(base), 7.3);
+    if (power > 1e-30) worst_power = std::max(worst_power, std::abs(power_of(base, 7.3f) / power - 1));
+  }
+  EXPECT_LT(worst_log, 0x1p-20);
+  EXPECT_LT(worst_exp, 0x1p-22);
+  EXPECT_LT(worst_power, 0x1p-20);
+  EXPECT_EQ(exp2_of(-1e30f), 0);
+  EXPECT_EQ(exp2_of(0), 1);
+  EXPECT_EQ(exp2_of(1e30f), std::exp2(127.0f));
+  EXPECT_EQ(power_of(0, 2), 0);
+}
+
 double linear_from_srgb(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
 double srgb_from_linear(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
 

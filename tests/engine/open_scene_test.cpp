@@ -49,6 +49,8 @@ struct OpenedFile {
   }
 };
 
+MaterialLayers* layers_of(OpenedFile& file) { return file.rows<MaterialLayers>(tables::kMaterialLayers); }
+
 /// Textures, emission, instances, coverage, attributes, several materials: something in every table.
 class OpenScene : public ::testing::Test {
  protected:
@@ -59,7 +61,8 @@ class OpenScene : public ::testing::Test {
     const uint32_t texture = scene.add_texture(fs_, 70, 3, rgba);
     scene.json["materials"] = {
         {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}},
-        {{"emissiveFactor", {1, 1, 1}}}};
+        {{"emissiveFactor", {1, 1, 1}}},
+        {{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}, {"clearcoatTexture", {{"index", texture}, {"extensions", {{"KHR_texture_transform", {{"rotation", 1}}}}}}}}}}}}};
     scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}}}}};
     scene.json["extensionsUsed"] = {"KHR_lights_punctual"};
     scene.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};
@@ -74,7 +77,9 @@ class OpenScene : public ::testing::Test {
     scene.json["meshes"][shared]["primitives"].push_back({{"attributes", attributes}, {"material", 1}});
     scene.add_node({{"mesh", shared}});
     scene.add_node({{"mesh", shared}, {"translation", {30, 0, 0}}, {"scale", {1, 2, 1}}});
-    scene.add_node({{"mesh", scene.add_triangle_mesh(0, 5)}});
+    const uint32_t coated = scene.add_triangle_mesh(0, 5);
+    scene.json["meshes"][coated]["primitives"][0]["material"] = 2;
+    scene.add_node({{"mesh", coated}});
     scene.add_node({{"camera", 0}});
     scene.add_node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
     scene.save(fs_);
@@ -122,6 +127,18 @@ TEST_F(OpenScene, RefusesWhatWouldBeReadOutsideItsTable) {
       {"texture", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[0].base_color_texture.texture = 1; }},
       {"uv set", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[0].normal_texture.uv_set = 4; }},
       {"coverage", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[0].coverage = CoverageMode{7}; }},
+      {"effects", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[0].effects = 1u << 20; }},
+      {"layers row", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[2].layers = 1; }},
+      {"transform", [](OpenedFile& f) { f.rows<Material>(tables::kMaterials)[0].base_color_texture.transform = 9; }},
+      {"layer texture", [](OpenedFile& f) { layers_of(f)->sheen_color_texture.texture = 5; }},
+      {"layer factor", [](OpenedFile& f) { layers_of(f)->clearcoat = 1.5f; }},
+      {"layer index", [](OpenedFile& f) { layers_of(f)->ior = 0.5f; }},
+      {"layer absorption", [](OpenedFile& f) { layers_of(f)->absorption[1] = 1; }},
+      {"layer volume", [](OpenedFile& f) { layers_of(f)->volume = 2; }},
+      {"layer rotation", [](OpenedFile& f) { layers_of(f)->anisotropy_sin = NAN; }},
+      {"no layers", [](OpenedFile& f) { f.tables[tables::kMaterialLayers].clear(); }},
+      {"transform number", [](OpenedFile& f) { f.rows<TextureTransform>(tables::kTextureTransforms)->m[2] = INFINITY; }},
+      {"no transforms", [](OpenedFile& f) { f.tables[tables::kTextureTransforms].clear(); }},
       {"width", [](OpenedFile& f) { f.rows<Texture>(tables::kTextures)->width = 1u << 20; }},
       {"levels", [](OpenedFile& f) { f.rows<Texture>(tables::kTextures)->level_count = 17; }},
       {"tile", [](OpenedFile& f) { f.rows<Texture>(tables::kTextures)->first_page[0] = 0xfffffff0u; }},
