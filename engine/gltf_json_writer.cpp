@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
+
+#include "engine/gltf_extensions_json.h"
 
 namespace shoal {
 namespace {
@@ -40,6 +43,12 @@ class JsonText {
   void value(const std::string& text) {
     separate();
     text_ += nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  }
+  /// JSON as it is.
+  void text_member(const char* name, const std::string& json) {
+    key(name);
+    separate();
+    text_ += json;
   }
   template <class T>
   void member(const char* name, const T& of) {
@@ -143,6 +152,7 @@ void write_texture_slot(JsonText& json, const char* name, const std::optional<gl
   json.member("index", info->texture);
   if (info->texcoord != 0) json.member("texCoord", info->texcoord);
   if (normal_scale != 1) json.member("scale", normal_scale);
+  if (info->transformed()) json.text_member("extensions", texture_transform_json(*info));
   json.close('}');
 }
 
@@ -152,7 +162,8 @@ bool has_specular(const gltf::Material& material) {
 }
 
 void write_material_extensions(JsonText& json, const gltf::Material& material) {
-  if (material.emissive_strength == 1 && material.ior == 1.5 && !has_specular(material)) return;
+  const auto more = material_extensions_json(material);
+  if (material.emissive_strength == 1 && material.ior == 1.5 && !has_specular(material) && more.empty()) return;
   json.key("extensions");
   json.open('{');
   if (material.emissive_strength != 1) {
@@ -176,6 +187,7 @@ void write_material_extensions(JsonText& json, const gltf::Material& material) {
     write_texture_slot(json, "specularColorTexture", material.specular_color_texture);
     json.close('}');
   }
+  for (const auto& [name, extension] : more) json.text_member(name.c_str(), extension);
   json.close('}');
 }
 
@@ -281,12 +293,24 @@ std::vector<std::string> extensions_of(const gltf::Document& document) {
     return std::any_of(document.materials.begin(), document.materials.end(), predicate);
   };
   std::vector<std::string> used;
+  std::set<std::string> more;
+  for (const gltf::Material& m : document.materials) {
+    for (const auto& [name, extension] : material_extensions_json(m)) {
+      more.insert(name);
+      if (extension.find("KHR_texture_transform") != std::string::npos) more.insert("KHR_texture_transform");
+    }
+    for (const auto* info : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
+                             &m.emissive_texture, &m.specular_texture, &m.specular_color_texture}) {
+      if (*info && (*info)->transformed()) more.insert("KHR_texture_transform");
+    }
+  }
   if (!document.lights.empty()) used.push_back("KHR_lights_punctual");
   if (any([](const gltf::Material& m) { return m.emissive_strength != 1; })) {
     used.push_back("KHR_materials_emissive_strength");
   }
   if (any([](const gltf::Material& m) { return m.ior != 1.5; })) used.push_back("KHR_materials_ior");
   if (any(has_specular)) used.push_back("KHR_materials_specular");
+  used.insert(used.end(), more.begin(), more.end());
   return used;
 }
 

@@ -58,7 +58,7 @@ Result<MaterialSample> sample_material(const Material& material, const Surface& 
   return sample;
 }
 
-Result<Vec3> sample_normal(const Material& material, const Surface& surface, bool mapped, TextureContext& context) {
+Result<Vec3> sample_normal(const Material& material, const Surface& surface, TextureContext& context, bool mapped) {
   const TextureSlot& slot = material.normal_texture;
   if (slot.texture == kNoIndex || !mapped) return facing_normal(surface, surface.front_normal);
   return mapped_normal(slot, material.normal_scale, surface, context);

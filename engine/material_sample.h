@@ -17,7 +17,7 @@ struct TextureContext {
   TextureSampler& textures;
   CacheCounters& cache_counters;
   uint64_t& lookups_count;
-  std::span<const TextureTransform> transforms;  ///< empty: none is applied
+  std::span<const TextureTransform> transforms = {};  ///< empty: none is applied
 
   /// White when the slot is empty. `uv` is before the slot's transform. Fails with: what the cache returns.
   Result<Vec4> sample(const TextureSlot& slot, const Vec2& uv);
@@ -34,7 +34,8 @@ Result<Vec3> sample_base_color(const Material& material, const Surface& surface,
 /// The values of the BSDF.
 Result<MaterialSample> sample_material(const Material& material, const Surface& surface, TextureContext& context);
 /// The shading normal, mapped unless `mapped` is false, and turned to the side seen (engine/surface.h).
-Result<Vec3> sample_normal(const Material& material, const Surface& surface, bool mapped, TextureContext& context);
+Result<Vec3> sample_normal(const Material& material, const Surface& surface, TextureContext& context,
+                           bool mapped = true);
 
 /// Adds to `sample` the layers that `effects` (MaterialEffects) names.
 Status sample_layers(const MaterialLayers& layers, const Material& material, uint32_t effects,

@@ -4,6 +4,7 @@
 
 #include "engine/bsdf.h"
 #include "engine/dispersion.h"
+#include "engine/material_sample.h"
 #include "engine/math.h"
 #include "engine/sampler.h"
 #include "engine/shading_tables.h"
@@ -73,7 +74,7 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   TextureContext textures = context(counters, cache_counters);
   const bool mapped = (options_->effects.off & kEffectNormalMap) == 0;
   SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, textures));
-  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, mapped, textures));
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, textures, mapped));
   const Bsdf bsdf(values, tables_->impl().energy_table(), surface.geometric_normal, normal, surface.wo);
   if (bsdf.black()) return {};
   const Sides media{path.medium & kPathMediumMask, 0};
@@ -219,7 +220,7 @@ Status Shader::shade_layers(PathState& path, const Surface& surface, const Mater
   const uint32_t mapped = ~options_->effects.off & kEffectNormalMap;
   LayeredSample values;
   SHOAL_ASSIGN_OR_RETURN(static_cast<MaterialSample&>(values), sample_material(material, surface, textures));
-  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, mapped != 0, textures));
+  SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, textures, mapped != 0));
   const MaterialLayers& layers = layers_of(material);
   SHOAL_RETURN_IF_ERROR(
       sample_layers(layers, material, (effects & kLayerEffects) | mapped, surface, textures, values));

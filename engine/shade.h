@@ -10,12 +10,15 @@
 
 #include "engine/effects.h"
 #include "engine/path_state.h"
-#include "engine/material_sample.h"
 #include "engine/scene.h"
 #include "engine/texture_sample.h"
 #include "io/page_cache.h"
 
 namespace shoal {
+
+struct LayeredSample;
+struct Surface;
+struct TextureContext;
 
 /// --environment: constant radiance or an equirectangular picture (glTF axes: +y up; u = 0.5 looks along -z).
 struct EnvironmentOptions {

@@ -23,7 +23,8 @@ struct Written {
                              {"TEXCOORD_0", scene.add_floats(2, {0, 0, 1, 0, 0, 1})},
                              {"TEXCOORD_1", scene.add_floats(2, {0, 0, 2, 0, 0, 2})}};
     Json primitives = Json::array();
-    for (size_t i = 0; i < materials.size(); ++i) primitives.push_back({{"attributes", attributes}, {"material", i}});
+    for (size_t i = 0; i < materials.size(); ++i)
+      primitives.push_back({{"attributes", attributes}, {"material", i}});
     const uint32_t mesh = scene.add_mesh(primitives[0]);
     scene.json["meshes"][mesh]["primitives"] = primitives;
     scene.add_node({{"mesh", mesh}});
@@ -85,10 +86,11 @@ TEST(ConvertLayers, EachExtensionHasItsBitAndItsValues) {
 
 TEST(ConvertLayers, TexturesOfLayersAreStoredOnceWithTheirEncodingAndUvSet) {
   const Json slot = {{"index", 0}, {"texCoord", 1}};
-  const Scene scene = Written({with("KHR_materials_clearcoat", {{"clearcoatFactor", 1}, {"clearcoatTexture", slot}}),
-                               with("KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}}, {"sheenColorTexture", slot}}),
-                               with("KHR_materials_clearcoat", {{"clearcoatFactor", 0}, {"clearcoatTexture", slot}})})
-                          .build();
+  const Scene scene =
+      Written({with("KHR_materials_clearcoat", {{"clearcoatFactor", 1}, {"clearcoatTexture", slot}}),
+               with("KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}}, {"sheenColorTexture", slot}}),
+               with("KHR_materials_clearcoat", {{"clearcoatFactor", 0}, {"clearcoatTexture", slot}})})
+          .build();
   const MaterialLayers& coat = scene.material_layers.at(0);
   const MaterialLayers& sheen = scene.material_layers.at(1);
   ASSERT_EQ(scene.textures.size(), 2u);
@@ -105,7 +107,8 @@ TEST(ConvertLayers, TextureTransformsScaleTurnAndMoveAndAreStoredOnce) {
   };
   // The extension's own example: the lower left quarter, turned clockwise.
   const Json quarter = {{"offset", {0, 1}}, {"rotation", M_PI / 2}, {"scale", {0.5, 0.5}}};
-  const Scene scene = Written({moved(quarter), moved(quarter), moved({{"offset", {0, 0}}}), moved({{"texCoord", 1}})}).build();
+  const Scene scene =
+      Written({moved(quarter), moved(quarter), moved({{"offset", {0, 0}}}), moved({{"texCoord", 1}})}).build();
   ASSERT_EQ(scene.texture_transforms.size(), 1u);
   EXPECT_EQ(scene.materials[0].base_color_texture.transform, 1);
   EXPECT_EQ(scene.materials[1].base_color_texture.transform, 1);
@@ -126,7 +129,7 @@ TEST(ConvertLayers, AVariantChangesTheMaterialsOfItsPrimitivesAndStaysInTheRecor
   Json& primitives = written.scene.json["meshes"][0]["primitives"];
   primitives.erase(1);
   primitives[0]["extensions"]["KHR_materials_variants"]["mappings"] = {{{"material", 1}, {"variants", {0, 2}}},
-                                                                      {{"material", 0}, {"variants", {1}}}};
+                                                                       {{"material", 0}, {"variants", {1}}}};
   written.scene.json["extensions"]["KHR_materials_variants"]["variants"] = {
       {{"name", "night"}}, {{"name", "day"}}, {{"name", "late night"}}};
   written.scene.json["extensionsUsed"] = written.scene.json["extensionsRequired"] = {"KHR_materials_variants"};

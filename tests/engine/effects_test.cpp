@@ -1,8 +1,9 @@
-// Every effect of materials: a scene made for it, where forcing it off changes the picture; forcing it on never does;
-// and the plan says what is on and why.
+// Every effect of materials: a scene made for it, where forcing it off changes the picture; forcing it on never
+// does; and the plan says what is on and why.
+#include "engine/effects.h"
+
 #include <gtest/gtest.h>
 
-#include "engine/effects.h"
 #include "tests/support/cube_scene.h"
 
 namespace shoal::testing {
@@ -24,9 +25,10 @@ std::vector<EffectCase> effect_cases() {
     material["pbrMetallicRoughness"] = pbr;
     cases.push_back({name, material});
   };
-  const Json glass = {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
-                      {"KHR_materials_volume",
-                       {{"thicknessFactor", 1}, {"attenuationDistance", 0.5}, {"attenuationColor", {0.9, 0.5, 0.2}}}}};
+  const Json glass = {
+      {"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+      {"KHR_materials_volume",
+       {{"thicknessFactor", 1}, {"attenuationDistance", 0.5}, {"attenuationColor", {0.9, 0.5, 0.2}}}}};
   Json prism = glass;
   prism["KHR_materials_dispersion"] = {{"dispersion", 5}};
   add("unlit", plain, extension("KHR_materials_unlit", Json::object()));
@@ -68,7 +70,8 @@ TEST(Effects, ForcingOneOffChangesTheSceneThatIsMadeForItAndForcingOnNeverDoes) 
 }
 
 TEST(Effects, ForcingAnythingOffOrOnLeavesAPlainSceneAsItIs) {
-  CubeScene cube({{"name", "plain"}, {"pbrMetallicRoughness", {{"metallicFactor", 0.5}, {"roughnessFactor", 0.3}}}});
+  CubeScene cube(
+      Json{{"name", "plain"}, {"pbrMetallicRoughness", {{"metallicFactor", 0.5}, {"roughnessFactor", 0.3}}}});
   const std::vector<float> whole = cube.picture(with_effects(""));
   EXPECT_EQ(cube.picture(with_effects("-all")), whole);
   EXPECT_EQ(cube.picture(with_effects("all")), whole);
@@ -76,12 +79,12 @@ TEST(Effects, ForcingAnythingOffOrOnLeavesAPlainSceneAsItIs) {
 }
 
 TEST(Effects, ExtensionsThatChangeNothingAskForNothing) {
-  for (const Json& extensions :
-       {Json{{"KHR_materials_clearcoat", {{"clearcoatRoughnessFactor", 0.5}}}},
-        Json{{"KHR_materials_sheen", {{"sheenRoughnessFactor", 0.5}}}},
-        Json{{"KHR_materials_volume", {{"thicknessFactor", 1}}}}, Json{{"KHR_materials_dispersion", {{"dispersion", 1}}}},
-        Json{{"KHR_materials_iridescence", {{"iridescenceIor", 1.8}}}}}) {
-    CubeScene cube({{"extensions", extensions}});
+  for (const Json& extensions : {Json{{"KHR_materials_clearcoat", {{"clearcoatRoughnessFactor", 0.5}}}},
+                                 Json{{"KHR_materials_sheen", {{"sheenRoughnessFactor", 0.5}}}},
+                                 Json{{"KHR_materials_volume", {{"thicknessFactor", 1}}}},
+                                 Json{{"KHR_materials_dispersion", {{"dispersion", 1}}}},
+                                 Json{{"KHR_materials_iridescence", {{"iridescenceIor", 1.8}}}}}) {
+    CubeScene cube(Json{{"extensions", extensions}});
     cube.scene.save(cube.fs);
     ASSERT_TRUE(build_scene(cube.fs, "scene.gltf", "scene.shoal", {}).ok());
     const auto scene = open_scene(cube.fs, "scene.shoal", ReadMode::kBuffered, {});
@@ -92,7 +95,8 @@ TEST(Effects, ExtensionsThatChangeNothingAskForNothing) {
 }
 
 TEST(Effects, ThePlanSaysWhatIsOnHowManyMaterialsCallForItAndWhichIsFirst) {
-  CubeScene cube({{"name", "velvet"}, {"extensions", {{"KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}}}}}}});
+  CubeScene cube(
+      Json{{"name", "velvet"}, {"extensions", {{"KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}}}}}}});
   cube.scene.save(cube.fs);
   ASSERT_TRUE(build_scene(cube.fs, "scene.gltf", "scene.shoal", {}).ok());
   const auto scene = open_scene(cube.fs, "scene.shoal", ReadMode::kBuffered, {});

@@ -1,6 +1,6 @@
 // The white furnace over layers: nothing gains energy at any roughness, index and angle, and single lobes with
-// compensation lose next to none. By the mean weight of drawn directions, which layered_sampling_test holds to their
-// density, and for the tables by finer integrals.
+// compensation lose next to none. By the mean weight of drawn directions, which layered_sampling_test holds to
+// their density, and for the tables by finer integrals.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,8 +20,8 @@ Vec3 view(float mu, float phi = 0.6f) {
   return {sine * std::cos(phi), sine * std::sin(phi), mu};
 }
 
-/// Mean weight of draws along a sequence that fills the cube evenly (Roberts 2018, "R3"): what the surface sends out
-/// of what comes from wo. Error about 0.2 % of 1.
+/// Mean weight of draws along a sequence that fills the cube evenly (Roberts 2018, "R3"): what the surface sends
+/// out of what comes from wo. Error about 0.2 % of 1.
 Vec3 albedo(const LayeredSample& m, float mu, float phi = 0.6f, uint32_t draws = 8192) {
   constexpr double kRoot = 1.2207440846057596;  // x^4 = x + 1
   const LayeredBsdf bsdf(m, lobe_tables(), kUp, kUp, view(mu, phi));
@@ -131,7 +131,8 @@ TEST(LayeredFurnace, AFilmReflectsBetweenNothingAndEverythingAndNothingOfItselfW
     }
   }
   EXPECT_NEAR(thin_film_reflectance(1, 1.5f, 0, Vec3(0.04f)).y, 0.04f, 0.01f);
-  const Vec3 blue = thin_film_reflectance(1, 1.3f, 200, Vec3(0.3f)), red = thin_film_reflectance(1, 1.3f, 300, Vec3(0.3f));
+  const Vec3 blue = thin_film_reflectance(1, 1.3f, 200, Vec3(0.3f)),
+             red = thin_film_reflectance(1, 1.3f, 300, Vec3(0.3f));
   EXPECT_GT(glm::length(blue - red), 0.05f);
 }
 

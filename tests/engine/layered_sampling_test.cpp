@@ -112,8 +112,8 @@ TEST(LayeredSampling, BeyondTheCriticalAngleEverythingIsReflected) {
   }
 }
 
-/// f of the specular, sheen and thin lobes does not change when the directions are swapped; layers that are scaled by
-/// wo's albedo alone do, and so does the compensation: measured without both.
+/// f of the specular, sheen and thin lobes does not change when the directions are swapped; layers that are scaled
+/// by wo's albedo alone do, and so does the compensation: measured without both.
 TEST(LayeredSampling, LobesWithASymmetricFormulaAreReciprocal) {
   const Vec3 a = view(0.8f, 0.3f), b = view(0.35f, 2.0f);
   const Sheen sheen{0.4f};
@@ -141,7 +141,8 @@ TEST(LayeredSampling, LobesWithASymmetricFormulaAreReciprocal) {
 TEST(LayeredSampling, WithoutLayersItIsThePlainBsdfToTheBit) {
   const Vec3 normal = glm::normalize(Vec3(0.3f, -0.5f, 0.7f));
   for (const MaterialSample& plain :
-       {MaterialSample{Vec3(0.8f), 0, 0.5f, 0, Vec3(1), 0.04f}, MaterialSample{Vec3(0.8f), 1, 0.6f, 1, Vec3(1), 0.04f},
+       {MaterialSample{Vec3(0.8f), 0, 0.5f, 0, Vec3(1), 0.04f},
+        MaterialSample{Vec3(0.8f), 1, 0.6f, 1, Vec3(1), 0.04f},
         MaterialSample{Vec3(0.9f, 0.3f, 0.1f), 0.4f, 0.3f, 0.7f, Vec3(1, 2, 0.5f), 0.1f},
         MaterialSample{Vec3(0.5f), 0, 0.0f, 1, Vec3(1), 0.04f}}) {
     LayeredSample layered;

@@ -59,10 +59,12 @@ class OpenScene : public ::testing::Test {
     std::vector<uint8_t> rgba(70 * 3 * 4);
     for (size_t i = 0; i < rgba.size(); ++i) rgba[i] = static_cast<uint8_t>(i * 37);
     const uint32_t texture = scene.add_texture(fs_, 70, 3, rgba);
+    const nlohmann::json turned = {{"index", texture}, {"extensions", {{"KHR_texture_transform", {{"rotation", 1}}}}}};
+    const nlohmann::json coat = {{"clearcoatFactor", 1}, {"clearcoatTexture", turned}};
     scene.json["materials"] = {
         {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}},
         {{"emissiveFactor", {1, 1, 1}}},
-        {{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}, {"clearcoatTexture", {{"index", texture}, {"extensions", {{"KHR_texture_transform", {{"rotation", 1}}}}}}}}}}}}};
+        {{"extensions", {{"KHR_materials_clearcoat", coat}}}}};
     scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}}}}};
     scene.json["extensionsUsed"] = {"KHR_lights_punctual"};
     scene.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};

@@ -1,4 +1,5 @@
-// Whole paths through volumes, against closed formulas: Beer's law, straight volumes that are not there, wavelengths.
+// Whole paths through volumes, against closed formulas: Beer's law, straight volumes that are not there,
+// wavelengths.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +23,7 @@ ShadingOptions sky(float radiance, uint32_t bounces = 64) {
 }
 
 /// A box of 2 x 2 x 2 around the origin, front faces outwards.
-ShadingScene box_scene(const MaterialLayers& layers, uint32_t effects, float f0) {
+ShadingScene box_scene(uint32_t effects, float f0) {
   TriangleSoup soup;
   const Vec3 x(2, 0, 0), y(0, 2, 0), z(0, 0, 2), c(-1, -1, -1);
   add_rectangle(soup, c, y, x, 0), add_rectangle(soup, c + z, x, y, 0);
@@ -31,9 +32,7 @@ ShadingScene box_scene(const MaterialLayers& layers, uint32_t effects, float f0)
   Material m = matte(Vec3(1));
   m.roughness = 0, m.specular = f0 > 0 ? 1.0f : 0.0f, m.dielectric_f0 = f0;
   m.effects = effects, m.layers = 0;
-  ShadingScene scene(std::move(soup), {m});
-  scene.scene.material_layers = {layers};
-  return scene;
+  return ShadingScene(std::move(soup), {m});
 }
 
 MaterialLayers clear(float ior) {
@@ -47,9 +46,11 @@ constexpr uint32_t kGlassEffects = kEffectTransmission | kEffectVolume;
 TEST(VolumeTransport, AVolumeThatBendsNothingAbsorbsByBeersLaw) {
   MaterialLayers l = clear(1);
   l.absorption[0] = -0.5f, l.absorption[1] = -1, l.absorption[2] = 0;
-  ShadingScene s = box_scene(l, kGlassEffects, 0);
+  ShadingScene s = box_scene(kGlassEffects, 0);
+  s.scene.material_layers = {l};
   s.prepare(sky(1));
-  const Vec3 through = s.mean_radiance({0.1f, 0.2f, 5}, {0, 0, -3}, 2000);  // 2 units, whatever the direction's length
+  const Vec3 through =
+      s.mean_radiance({0.1f, 0.2f, 5}, {0, 0, -3}, 2000);  // 2 units, whatever the direction's length
   EXPECT_NEAR(through.x, std::exp2(-1.0), 0.01);
   EXPECT_NEAR(through.y, std::exp2(-2.0), 0.01);
   EXPECT_NEAR(through.z, 1, 0.01);
@@ -61,7 +62,8 @@ TEST(VolumeTransport, AVolumeThatBendsNothingAbsorbsByBeersLaw) {
 TEST(VolumeTransport, ClearGlassUnderAnEvenSkyCannotBeSeen) {
   for (const float ior : {1.33f, 1.5f, 2.4f}) {
     const float r = (ior - 1) / (ior + 1);
-    ShadingScene s = box_scene(clear(ior), kGlassEffects, r * r);
+    ShadingScene s = box_scene(kGlassEffects, r * r);
+    s.scene.material_layers = {clear(ior)};
     s.prepare(sky(1, 200));
     EXPECT_NEAR(s.mean_radiance({0.3f, 0.2f, 5}, {-0.05f, 0.02f, -1}, 4000).y, 1, 0.02) << ior;
   }
@@ -70,7 +72,8 @@ TEST(VolumeTransport, ClearGlassUnderAnEvenSkyCannotBeSeen) {
 TEST(VolumeTransport, DispersionLeavesWhiteWhite) {
   MaterialLayers l = clear(1.5f);
   l.dispersion = 3;
-  ShadingScene s = box_scene(l, kGlassEffects | kEffectDispersion, 0.04f);
+  ShadingScene s = box_scene(kGlassEffects | kEffectDispersion, 0.04f);
+  s.scene.material_layers = {l};
   s.prepare(sky(1, 200));
   const Vec3 mean = s.mean_radiance({0.3f, 0.2f, 5}, {-0.05f, 0.02f, -1}, 20000);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c], 1, 0.04) << c;
@@ -85,7 +88,8 @@ TEST(VolumeTransport, IndicesFollowTheAbbeNumber) {
   }
   EXPECT_EQ(dispersed_ior(1.01f, 100, 700), 1);
   glm::dvec3 sum(0);
-  for (int i = 0; i < 3000; ++i) sum += glm::dvec3(wavelength_weight(kShortestWave + 0.1f * (static_cast<float>(i) + 0.5f))) / 3000.0;
+  for (int i = 0; i < 3000; ++i)
+    sum += glm::dvec3(wavelength_weight(kShortestWave + 0.1f * (static_cast<float>(i) + 0.5f))) / 3000.0;
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c], 1, 1e-4);
 }
 

@@ -25,14 +25,16 @@ Document load(const GltfScene& scene) {
 }
 
 TEST(GltfMaterialExtensions, HaveTheDefaultsOfTheirSpecifications) {
-  const MaterialExtensions m =
-      load(scene_with({{"KHR_materials_transmission", json::object()}, {"KHR_materials_volume", json::object()},
-                       {"KHR_materials_clearcoat", json::object()}, {"KHR_materials_sheen", json::object()},
-                       {"KHR_materials_anisotropy", json::object()}, {"KHR_materials_iridescence", json::object()},
-                       {"KHR_materials_dispersion", json::object()},
-                       {"KHR_materials_diffuse_transmission", json::object()}}))
-          .materials[0]
-          .more;
+  const MaterialExtensions m = load(scene_with({{"KHR_materials_transmission", json::object()},
+                                                {"KHR_materials_volume", json::object()},
+                                                {"KHR_materials_clearcoat", json::object()},
+                                                {"KHR_materials_sheen", json::object()},
+                                                {"KHR_materials_anisotropy", json::object()},
+                                                {"KHR_materials_iridescence", json::object()},
+                                                {"KHR_materials_dispersion", json::object()},
+                                                {"KHR_materials_diffuse_transmission", json::object()}}))
+                                   .materials[0]
+                                   .more;
   EXPECT_FALSE(m.unlit);
   EXPECT_EQ(m.transmission, 0);
   EXPECT_FALSE(m.has_volume);
@@ -55,14 +57,15 @@ TEST(GltfMaterialExtensions, HaveTheDefaultsOfTheirSpecifications) {
 TEST(GltfMaterialExtensions, AreReadWithTheirTextures) {
   const json texture = {{"index", 0}};
   const MaterialExtensions m =
-      load(scene_with({{"KHR_materials_unlit", json::object()},
-                       {"KHR_materials_volume",
-                        {{"thicknessFactor", 0.5}, {"attenuationDistance", 3}, {"attenuationColor", {0.1, 0.2, 0.3}}}},
-                       {"KHR_materials_clearcoat",
-                        {{"clearcoatFactor", 0.5},
-                         {"clearcoatTexture", texture},
-                         {"clearcoatNormalTexture", {{"index", 0}, {"scale", 0.25}}}}},
-                       {"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}, {"anisotropyTexture", texture}}}}))
+      load(scene_with(
+               {{"KHR_materials_unlit", json::object()},
+                {"KHR_materials_volume",
+                 {{"thicknessFactor", 0.5}, {"attenuationDistance", 3}, {"attenuationColor", {0.1, 0.2, 0.3}}}},
+                {"KHR_materials_clearcoat",
+                 {{"clearcoatFactor", 0.5},
+                  {"clearcoatTexture", texture},
+                  {"clearcoatNormalTexture", {{"index", 0}, {"scale", 0.25}}}}},
+                {"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}, {"anisotropyTexture", texture}}}}))
           .materials[0]
           .more;
   EXPECT_TRUE(m.unlit && m.has_volume);
@@ -79,7 +82,8 @@ TEST(GltfMaterialExtensions, FactorsOutsideTheirRangeAreClampedWithAWarningThatN
     json extensions;
     const char* place;
   } cases[] = {
-      {{{"KHR_materials_transmission", {{"transmissionFactor", 1.5}}}}, "KHR_materials_transmission.transmissionFactor"},
+      {{{"KHR_materials_transmission", {{"transmissionFactor", 1.5}}}},
+       "KHR_materials_transmission.transmissionFactor"},
       {{{"KHR_materials_clearcoat", {{"clearcoatFactor", -1}}}}, "KHR_materials_clearcoat.clearcoatFactor"},
       {{{"KHR_materials_sheen", {{"sheenColorFactor", {0, 2, 0}}}}}, "KHR_materials_sheen.sheenColorFactor"},
       {{{"KHR_materials_iridescence", {{"iridescenceIor", 0.5}}}}, "KHR_materials_iridescence.iridescenceIor"},
@@ -110,7 +114,8 @@ TEST(GltfMaterialExtensions, WhatHasNoMeaningIsAnErrorThatNamesFileAndPlace) {
        "KHR_texture_transform.offset"},
   };
   for (const auto& c : cases) {
-    EXPECT_THAT(load_error(scene_with(c.extensions)), AllOf(HasSubstr("scene.gltf: materials[0]"), HasSubstr(c.place)));
+    EXPECT_THAT(load_error(scene_with(c.extensions)),
+                AllOf(HasSubstr("scene.gltf: materials[0]"), HasSubstr(c.place)));
   }
 }
 
@@ -120,7 +125,8 @@ TEST(GltfMaterialExtensions, TextureTransformsAreOfEachReferenceAndMayNameAnothe
       {"index", 0},
       {"texCoord", 1},
       {"extensions",
-       {{"KHR_texture_transform", {{"offset", {0.5, 0.25}}, {"rotation", 1}, {"scale", {2, 3}}, {"texCoord", 4}}}}}};
+       {{"KHR_texture_transform",
+         {{"offset", {0.5, 0.25}}, {"rotation", 1}, {"scale", {2, 3}}, {"texCoord", 4}}}}}};
   scene.root["materials"][0]["emissiveTexture"] = {{"index", 0}};
   const Material material = load(scene).materials[0];
   ASSERT_TRUE(material.base_color_texture);

@@ -23,9 +23,11 @@ struct CubeScene {
     texture = scene.add_texture(fs, 4, 4, rgba);
     scene.json["materials"] = {
         subject,
-        {{"name", "lamp"}, {"emissiveFactor", {1, 1, 1}},
+        {{"name", "lamp"},
+         {"emissiveFactor", {1, 1, 1}},
          {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}}}}},
-        {{"name", "floor"}, {"pbrMetallicRoughness", {{"baseColorFactor", {0.3, 0.5, 0.8, 1}}, {"metallicFactor", 0}}}}};
+        {{"name", "floor"},
+         {"pbrMetallicRoughness", {{"baseColorFactor", {0.3, 0.5, 0.8, 1}}, {"metallicFactor", 0}}}}};
     Json used = {"KHR_materials_emissive_strength", "KHR_texture_transform"};
     if (subject.contains("extensions")) {
       for (const auto& [name, value] : subject["extensions"].items()) used.push_back(name);
