@@ -67,7 +67,11 @@ void note_effects(Material& out, const MaterialPlan& plan) {
                                out.emissive_texture, out.specular_texture, out.specular_color_texture}) {
     transformed = transformed || s.transform != 0;
   }
-  if (out.layers != kNoIndex) transformed = transformed || has_transform(plan.layers[out.layers]);
+  if (out.layers != kNoIndex) {
+    const MaterialLayers& layers = plan.layers[out.layers];
+    transformed = transformed || has_transform(layers);
+    if (layers.clearcoat_normal_texture.texture != kNoIndex) out.effects |= kEffectNormalMap;
+  }
   if (transformed) out.effects |= kEffectTextureTransform;
 }
 

@@ -49,6 +49,11 @@ struct MaterialPlan {
   std::vector<std::string> warnings;
   uint32_t default_material = kNoIndex;
 
+  /// Whether a material asks for the tangents of its meshes: for a normal map or a direction of anisotropy.
+  bool wants_tangents(uint32_t material) const {
+    const Material& m = materials[material];
+    return ((m.effects & (kEffectNormalMap | kEffectAnisotropy)) != 0) || m.normal_texture.texture != kNoIndex;
+  }
   uint32_t material_of(const gltf::Primitive& primitive) const {
     return primitive.material ? *primitive.material : default_material;
   }

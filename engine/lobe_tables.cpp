@@ -42,7 +42,7 @@ float even_at(int i, int count) { return static_cast<float>(i) / static_cast<flo
 
 // Glass: the axis of eta is the reflectance amplitude r = (eta - 1) / (eta + 1), a half for each side, with nodes that
 // crowd at eta = 1, where what is lost changes fastest; at 1 itself nothing is above or below.
-constexpr int kGlassMu = 40, kGlassAlpha = 24, kGlassEta = 11;
+constexpr int kGlassMu = 40, kGlassAlpha = 24, kGlassEta = 15;
 /// The rougher, the more of the integrand is cut off by total reflection and the horizon.
 int glass_steps(int row) { return 12 + 16 * row / (kGlassAlpha - 1); }
 constexpr float kGlassReach = 0.6f;  // an index of 4; diamond is at 0.41
@@ -54,7 +54,9 @@ float eta_at(int i, bool denser) {
 }
 
 constexpr int kSheenMu = 48, kSheenAlpha = 28, kSheenSteps = 48;
-constexpr int kTurnedMu = 24, kTurnedPhi = 13, kTurnedAlpha = 14, kTurnedStrength = 7, kTurnedSteps = 14;
+constexpr float kFirstSheenRow = 0.141421356f;  // kMinSheenAlpha^(1/2)
+constexpr int kTurnedMu = 20, kTurnedPhi = 11, kTurnedAlpha = 14, kTurnedStrength = 10;
+int turned_steps(int row) { return 8 + 14 * row / (kTurnedAlpha - 1); }
 /// Azimuths from x to y, crowded at y: there the smooth direction begins to count, within alpha_y / alpha_x.
 float phi_at(int i) {
   const float x = 1 - even_at(i, kTurnedPhi);
@@ -164,7 +166,8 @@ float integrate_sheen_albedo(float mu, float alpha, int steps) {
 
 SheenTable::SheenTable() {
   for (int row = 0; row < kSheenAlpha; ++row) {
-    const float y = even_at(row, kSheenAlpha), alpha = std::max(kMinSheenAlpha, y * y);
+    const float y = kFirstSheenRow + (1 - kFirstSheenRow) * even_at(row, kSheenAlpha);
+    const float alpha = std::clamp(y * y, kMinSheenAlpha, 1.0f);
     for (int column = 0; column < kSheenMu; ++column) {
       cells_.push_back(integrate_sheen_albedo(mu_at(column, kSheenMu), alpha, kSheenSteps));
     }
@@ -173,7 +176,8 @@ SheenTable::SheenTable() {
 
 float SheenTable::albedo(float mu, float alpha) const {
   const AxisPoint axes[] = {axis_point(mu_place(mu, kSheenMu), kSheenMu),
-                            axis_point(std::sqrt(alpha) * (kSheenAlpha - 1), kSheenAlpha)};
+                            axis_point((std::sqrt(alpha) - kFirstSheenRow) / (1 - kFirstSheenRow) * (kSheenAlpha - 1),
+                                       kSheenAlpha)};
   const int strides[] = {1, kSheenMu};
   return interpolate(cells_.data(), axes, strides, 2);
 }
@@ -208,7 +212,7 @@ AnisotropyTable::AnisotropyTable() {
           const float mu = mu_at(column, kTurnedMu), sine = std::sqrt(std::max(0.0f, (1 - mu) * (1 + mu)));
           cells_.push_back(integrate_anisotropic_albedo({sine * phi.cos, sine * phi.sin, mu},
                                                         alpha_at(row, kTurnedAlpha), even_at(t, kTurnedStrength),
-                                                        kTurnedSteps));
+                                                        turned_steps(row)));
         }
       }
     }

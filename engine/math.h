@@ -24,7 +24,7 @@ float linear_to_srgb(float linear);
 float log2_of(float x);
 /// 2^x, relative error below 2^-22; 0 below -126, 2^127 above 127.
 float exp2_of(float x);
-/// x^y for x >= 0, with the same care: 0 for x = 0.
+/// x^y for x >= 0, relative error below 2^-18 for results above 2^-100; 0 for x = 0.
 float power_of(float x, float y);
 /// x^5 by multiplication (Schlick).
 inline float power5(float x) { return (x * x) * (x * x) * x; }

@@ -108,7 +108,7 @@ struct PrimitiveReader::State {
   void move();
   void append(const uint32_t* corners, uint32_t id, TriangleBlock& block) const;
   void append_corner(size_t place, std::vector<float>& corners) const;
-  bool wants_tangent() const { return plan.materials[material].normal_texture.texture != kNoIndex; }
+  bool wants_tangent() const { return plan.wants_tangents(material); }
 
   const gltf::Document& document;
   const MaterialPlan& plan;
@@ -259,7 +259,7 @@ CornerLayout layout_of(const gltf::Primitive& primitive, const MaterialPlan& pla
   CornerLayout layout;
   layout.normal = find_attribute(primitive, "NORMAL").has_value();
   layout.tangent = layout.normal && find_attribute(primitive, "TANGENT") &&
-                   plan.materials[material].normal_texture.texture != kNoIndex;
+                   plan.wants_tangents(material);
   layout.color = find_attribute(primitive, "COLOR_0").has_value();
   layout.uv_count = static_cast<uint8_t>(plan.uv_sets[material].count);
   return layout;

@@ -60,11 +60,11 @@ class OpenScene : public ::testing::Test {
     for (size_t i = 0; i < rgba.size(); ++i) rgba[i] = static_cast<uint8_t>(i * 37);
     const uint32_t texture = scene.add_texture(fs_, 70, 3, rgba);
     const nlohmann::json turned = {{"index", texture}, {"extensions", {{"KHR_texture_transform", {{"rotation", 1}}}}}};
-    const nlohmann::json coat = {{"clearcoatFactor", 1}, {"clearcoatTexture", turned}};
+    const nlohmann::json sheen = {{"sheenColorFactor", {1, 1, 1}}, {"sheenColorTexture", turned}};
     scene.json["materials"] = {
         {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}},
         {{"emissiveFactor", {1, 1, 1}}},
-        {{"extensions", {{"KHR_materials_clearcoat", coat}}}}};
+        {{"extensions", {{"KHR_materials_sheen", sheen}}}}};
     scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}}}}};
     scene.json["extensionsUsed"] = {"KHR_lights_punctual"};
     scene.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};
@@ -79,9 +79,9 @@ class OpenScene : public ::testing::Test {
     scene.json["meshes"][shared]["primitives"].push_back({{"attributes", attributes}, {"material", 1}});
     scene.add_node({{"mesh", shared}});
     scene.add_node({{"mesh", shared}, {"translation", {30, 0, 0}}, {"scale", {1, 2, 1}}});
-    const uint32_t coated = scene.add_triangle_mesh(0, 5);
-    scene.json["meshes"][coated]["primitives"][0]["material"] = 2;
-    scene.add_node({{"mesh", coated}});
+    const uint32_t velvet = scene.add_triangle_mesh(0, 5);
+    scene.json["meshes"][velvet]["primitives"][0]["material"] = 2;
+    scene.add_node({{"mesh", velvet}});
     scene.add_node({{"camera", 0}});
     scene.add_node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
     scene.save(fs_);
