@@ -125,7 +125,7 @@ class RandomWorker {
     const uint64_t first = context_.next.fetch_add(taken);
     for (uint64_t index = first; index < first + taken; ++index) {
       const uint32_t current = slot;
-      slot = context_.slots.state(current).next_free;
+      slot = context_.slots.state(current).next;
       if (index >= context_.starts.size()) {
         context_.slots.give_back(current);
         continue;

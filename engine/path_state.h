@@ -20,7 +20,7 @@ struct PathState {
   Vec3 throughput{1};
   float bsdf_pdf = 0;               ///< solid-angle density of `direction`; 0: camera (no MIS)
   Vec3 radiance{0};
-  uint32_t next_free = kNoIndex;    ///< link among free paths
+  uint32_t next = kNoIndex;         ///< link among free paths, or among those that wait to be shaded
   Vec3 shadow_radiance{0};          ///< added to radiance when the shadow ray arrives unoccluded
   float t = 0;                      ///< of `hit`
   // The ray that goes on: origin and direction from its birth, hit and t when its traversal is done.

@@ -19,7 +19,7 @@ class QueuedPaths {
  public:
   QueuedPaths(uint32_t treelet_count, uint32_t path_count, unsigned threads)
       : rays(treelet_count, path_count, threads),
-        to_shade(treelet_count, path_count),
+        to_shade(treelet_count),
         states_(path_count),
         path_count_(path_count) {}
 
@@ -28,7 +28,7 @@ class QueuedPaths {
   }
   /// Of `bytes`, what is not rays and their queues.
   static uint64_t state_bytes(uint32_t treelet_count, uint32_t path_count) {
-    return uint64_t{path_count} * sizeof(PathState) + PathLists::bytes(treelet_count, path_count);
+    return uint64_t{path_count} * sizeof(PathState) + PathLists::bytes(treelet_count);
   }
 
   PathState& state(uint32_t path) { return states_[path]; }
@@ -42,7 +42,7 @@ class QueuedPaths {
   }
   uint32_t path_count() const { return path_count_; }
 
-  /// Takes up to `wanted` free paths as a list linked by PathState::next_free; returns how many.
+  /// Takes up to `wanted` free paths as a list linked by PathState::next; returns how many.
   uint32_t take_free(uint32_t wanted, uint32_t* first) {
     std::lock_guard guard(lock_);
     uint32_t taken = 0;
@@ -50,26 +50,28 @@ class QueuedPaths {
     while (taken < wanted) {
       uint32_t path = free_;
       if (path != kNoIndex) {
-        free_ = states_[path].next_free;
+        free_ = states_[path].next;
       } else if (untouched_ < path_count_) {
         path = untouched_++;
         std::construct_at(&states_[path]);
       } else {
         break;
       }
-      states_[path].next_free = *first;
+      states_[path].next = *first;
       *first = path;
       ++taken;
     }
     free_count_.fetch_sub(taken, std::memory_order_relaxed);
     return taken;
   }
-  void give_back(uint32_t path) {
+  /// Gives back `count` paths, linked by PathState::next from `first` to `last`.
+  void give_back(uint32_t first, uint32_t last, uint32_t count) {
     std::lock_guard guard(lock_);
-    states_[path].next_free = free_;
-    free_ = path;
-    free_count_.fetch_add(1, std::memory_order_relaxed);
+    states_[last].next = free_;
+    free_ = first;
+    free_count_.fetch_add(count, std::memory_order_relaxed);
   }
+  void give_back(uint32_t path) { give_back(path, path, 1); }
   uint32_t free_count() const {
     const int64_t count = free_count_.load(std::memory_order_relaxed) + int64_t{path_count_};
     return count > 0 ? static_cast<uint32_t>(count) : 0;
@@ -88,6 +90,29 @@ class QueuedPaths {
   uint32_t free_ = kNoIndex;
   uint32_t untouched_ = 0;
   std::atomic<int64_t> free_count_{0};  ///< less path_count_
+};
+
+/// Ended paths of one thread: given back together, so that ending one costs no lock.
+class EndedPaths {
+ public:
+  explicit EndedPaths(QueuedPaths& paths) : paths_(paths) {}
+
+  uint32_t count() const { return count_; }
+  void add(uint32_t path) {
+    if (count_ == 0) last_ = path;
+    paths_.state(path).next = first_;
+    first_ = path;
+    ++count_;
+  }
+  void give_back() {
+    if (count_ > 0) paths_.give_back(first_, last_, count_);
+    first_ = last_ = kNoIndex;
+    count_ = 0;
+  }
+
+ private:
+  QueuedPaths& paths_;
+  uint32_t first_ = kNoIndex, last_ = kNoIndex, count_ = 0;
 };
 
 }  // namespace shoal

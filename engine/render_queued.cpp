@@ -7,12 +7,15 @@
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"
 #include "engine/treelet_scheduler.h"
+#include "queues/ray_outbox.h"
 
 namespace shoal {
 namespace {
 
 /// New paths are begun in batches, so that taking free ones and counting samples costs a lock a batch.
 constexpr uint32_t kMaxAdmitBatch = 1024;
+/// And so are ended ones given back.
+constexpr uint32_t kEndedBatch = 64;
 /// A thread with nothing to do looks again after this long, whatever the disk does.
 constexpr std::chrono::microseconds kLoadWait{1000};
 
@@ -25,7 +28,9 @@ class QueuedWorker {
         scheduler_(scheduler),
         batches_(batches),
         worker_(context, thread),
-        admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)) {}
+        admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)),
+        outbox_(paths.rays),
+        ended_(paths) {}
 
   void run() {
     while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.end_sample) {
@@ -68,13 +73,13 @@ class QueuedWorker {
     travel([&] {
       if (i == samples.size()) return false;
       const uint32_t current = path;
-      path = paths_.state(current).next_free;
+      path = paths_.state(current).next;
       fresh(worker_.begin_path(samples.first + i++, current, paths_.state(current)));
       return true;
     });
     for (; i < taken; ++i) {
       const uint32_t current = path;
-      path = paths_.state(current).next_free;
+      path = paths_.state(current).next;
       paths_.give_back(current);
     }
   }
@@ -89,7 +94,7 @@ class QueuedWorker {
     travel([&] {
       if (path != kNoIndex) {
         const uint32_t current = path;
-        path = paths_.to_shade.next(path);
+        path = paths_.state(current).next;
         if (path != kNoIndex) paths_.prefetch(path);
         vertex_ready(current);
         return true;
@@ -101,7 +106,6 @@ class QueuedWorker {
         worker_.counters().ray_moved_bytes += count * sizeof(Ray);
       }
       const Ray& ray = block_.rays[next++];
-      paths_.prefetch(path_index_of(ray));
       ++worker_.ray_counters(ray).rays_drained_count;
       group_.add(ray, worker_.page_in_hand());
       return true;
@@ -133,12 +137,20 @@ class QueuedWorker {
       worker_.step(group_, Phase::kQueue, decide);
       finish_rays();
     }
+    if (context_.ended.load(std::memory_order_relaxed)) {
+      outbox_.clear();
+    } else {
+      worker_.enter(Phase::kQueue);
+      outbox_.flush();
+    }
+    give_back_ended();
     group_.clear(), fresh_count_ = 0;
   }
 
   /// Sends a ray on to `treelet`: through the treelet in hand at once, into a queue, or home.
   const std::byte* route(uint32_t slot, const GroupRay& member, TreeletId treelet) {
     if (treelet == kNoIndex) {
+      paths_.prefetch(path_index_of(member.ray));
       home_[home_count_++] = slot;
       return nullptr;
     }
@@ -147,7 +159,7 @@ class QueuedWorker {
     worker_.count_leaving(member, treelet);
     ++worker_.ray_counters(ray).rays_queued_count;
     worker_.counters().ray_moved_bytes += sizeof(Ray);
-    paths_.rays.push(treelet, ray);
+    outbox_.push(treelet, ray);
     return nullptr;
   }
 
@@ -177,7 +189,7 @@ class QueuedWorker {
     if (path.hit.treelet != worker_.in_hand() || !worker_.attributes_at_hand()) {
       worker_.enter(Phase::kQueue);
       ++worker_.counters().paths_shaded_waiting_count;
-      paths_.to_shade.push(path.hit.treelet, path_index);
+      paths_.to_shade.push(path.hit.treelet, path_index, path.next);
       return;
     }
     Ray rays[2];
@@ -188,8 +200,13 @@ class QueuedWorker {
 
   void end(uint32_t path_index) {
     worker_.end_path(paths_.state(path_index));
-    paths_.give_back(path_index);
-    ++context_.samples_done;
+    ended_.add(path_index);
+    if (ended_.count() == kEndedBatch) give_back_ended();
+  }
+
+  void give_back_ended() {
+    context_.samples_done += ended_.count();
+    ended_.give_back();
   }
 
   RenderContext& context_;
@@ -206,6 +223,8 @@ class QueuedWorker {
   Ray fresh_[2 * RayGroup::kCapacity];
   uint32_t fresh_count_ = 0;
   RayBlock block_;
+  RayOutbox outbox_;
+  EndedPaths ended_;
 };
 
 }  // namespace

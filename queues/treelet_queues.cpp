@@ -33,17 +33,23 @@ TreeletQueues::TreeletQueues(uint32_t treelet_count, uint32_t path_count, unsign
       queues_(std::make_unique<Queue[]>(treelet_count)),
       pool_(blocks_needed(treelet_count, path_count, threads)) {}
 
-void TreeletQueues::push(TreeletId treelet, const Ray& ray) {
+void TreeletQueues::push(TreeletId treelet, std::span<const Ray> rays) {
   Queue& queue = queues_[treelet];
   std::lock_guard guard(queue.lock);
-  if (queue.head == kNoIndex || pool_.count(queue.head) == kRaysPerBlock) {
-    const BlockId block = pool_.acquire();
-    pool_.next(block) = queue.head;
-    queue.head = block;
+  for (size_t pushed = 0; pushed < rays.size();) {
+    if (queue.head == kNoIndex || pool_.count(queue.head) == kRaysPerBlock) {
+      const BlockId block = pool_.acquire();
+      pool_.next(block) = queue.head;
+      queue.head = block;
+    }
+    uint32_t& count = pool_.count(queue.head);
+    const size_t fitting = std::min<size_t>(rays.size() - pushed, kRaysPerBlock - count);
+    std::copy_n(rays.data() + pushed, fitting, pool_.block(queue.head).rays + count);
+    count += static_cast<uint32_t>(fitting);
+    pushed += fitting;
   }
-  uint32_t& count = pool_.count(queue.head);
-  pool_.block(queue.head).rays[count++] = ray;
-  queue.rays.store(queue.rays.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  const uint32_t waiting = queue.rays.load(std::memory_order_relaxed);
+  queue.rays.store(waiting + static_cast<uint32_t>(rays.size()), std::memory_order_relaxed);
 }
 
 RayBatch TreeletQueues::take(TreeletId treelet) {

@@ -2,12 +2,12 @@
 //
 // Properties and assumptions
 //   order      none promised: a drain takes the newest block first. Pictures do not depend on it.
-//   ownership  push() copies the ray; take() hands all blocks of a queue to the caller, who gives each back to the
+//   ownership  push() copies the rays; take() hands all blocks of a queue to the caller, who gives each back to the
 //              pool after reading it (RayBatch does both).
 //   capacity   every path owns at most two rays, so with blocks_needed(paths) blocks a push always finds a place:
 //              full blocks hold at most all rays, and each queue (or batch being drained) has one block
 //              that is not full. Draining never allocates, hence nothing can deadlock.
-//   threads    any number; one lock a push on the queue of that treelet.
+//   threads    any number; one lock a push on the queue of that treelet (a thread gathers rays in a RayOutbox before).
 #pragma once
 
 #include <atomic>
@@ -43,7 +43,8 @@ class TreeletQueues {
   /// Memory of queues and pool for these numbers.
   static uint64_t bytes(uint32_t treelet_count, uint32_t path_count, unsigned threads);
 
-  void push(TreeletId treelet, const Ray& ray);
+  void push(TreeletId treelet, std::span<const Ray> rays);
+  void push(TreeletId treelet, const Ray& ray) { push(treelet, {&ray, 1}); }
   RayBatch take(TreeletId treelet);
 
   uint32_t treelet_count() const { return treelet_count_; }
