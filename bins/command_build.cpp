@@ -14,6 +14,7 @@ struct BuildArguments {
   std::string scene, output, treelet_size, max_memory, scratch_folder, variant;
   unsigned threads = 0;
   bool consume = false;
+  PoseOptions pose;
 };
 
 Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console) {
@@ -29,6 +30,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   options.scratch_folder = arguments.scratch_folder;
   options.consume = arguments.consume;
   options.variant = arguments.variant;
+  options.pose = arguments.pose;
   options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
   options.stop = stop_on_signals();
@@ -72,6 +74,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_flag("--consume", arguments->consume,
                 "DESTROYS the source: gives the disk space of its .bin parts back while they are read, even if the build "
                 "fails later; .gltf and images stay; not for .glb");
+  declare_pose(*sub, arguments->pose);
   sub->add_option("--threads", arguments->threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_build(*arguments, console); };

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "bins/choice_option.h"
+#include "bins/lens_options.h"
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
 #include "engine/source_files.h"
@@ -180,6 +181,11 @@ Status check_output(const std::string& path) {
   return {};
 }
 
+void declare_pose(CLI::App& app, PoseOptions& pose) {
+  app.add_option("--time", pose.time, "seconds into the animation that the scene is posed at (default: nodes at rest)");
+  app.add_option("--animation", pose.animation, "its name or index (default: the first)")->type_name("NAME|INDEX");
+}
+
 void RenderArguments::declare(CLI::App& app) {
   app.add_option("scene", scene, "scene: .gltf, .glb (built first where needed) or .shoal")->required();
   app.add_option("--width", picture.width, "picture width in pixels")->capture_default_str();
@@ -187,7 +193,8 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--spp", picture.samples, "samples a pixel")->capture_default_str();
   app.add_option("--bounces", picture.shading.bounces, "scattering events of a path at most")->capture_default_str();
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
-  app.add_option("--camera", picture.camera, "index among the scene's cameras")->capture_default_str();
+  declare_lens(app, picture);
+  declare_pose(app, pose);
   app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
   app.add_option("--variant", variant, kVariantHelp);
   app.add_option("--effects", effects,
@@ -260,6 +267,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   build.variant = arguments.variant;
   build.threads = arguments.execution.threads;
   build.scratch_folder = arguments.scratch_folder;
+  build.pose = arguments.pose;
   build.max_memory_bytes = prepared.execution.max_memory_bytes;
   if (!arguments.treelet_size.empty()) {
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
@@ -272,6 +280,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
   SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, picture_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
+  if (is_shoal_file(arguments.scene)) SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));
   }

@@ -39,9 +39,13 @@ inline constexpr const char* kMaxMemoryHelp =
 inline constexpr const char* kVariantHelp =
     "name of one of the scene's material variants (default: the materials that it shows without one)";
 
+/// --time and --animation, which `build` has as well.
+void declare_pose(CLI::App& app, PoseOptions& pose);
+
 /// Options as they stand on the command line.
 struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder, variant, effects;
+  PoseOptions pose;
   PictureOptions picture;
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false;

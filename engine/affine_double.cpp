@@ -20,6 +20,13 @@ bool finite(const Vec3d& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) 
 
 }  // namespace
 
+AffineDouble affine_of(const std::array<double, 16>& matrix) {
+  AffineDouble m;
+  for (size_t i = 0; i < 3; ++i) m.column[i] = {matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]};
+  m.translation = {matrix[12], matrix[13], matrix[14]};
+  return m;
+}
+
 AffineDouble multiply(const AffineDouble& a, const AffineDouble& b) {
   AffineDouble r;
   for (int i = 0; i < 3; ++i) r.column[i] = a.vector(b.column[i]);

@@ -28,6 +28,8 @@ struct AffineDouble {
   }
 };
 
+/// Of a column-major matrix whose last row is 0 0 0 1.
+AffineDouble affine_of(const std::array<double, 16>& matrix);
 AffineDouble multiply(const AffineDouble& a, const AffineDouble& b);
 double determinant(const AffineDouble& a);
 /// The linear part's cofactors, as columns, with no translation: determinant * inverse transpose, defined for

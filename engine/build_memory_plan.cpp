@@ -80,7 +80,7 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
   plan.cap_bytes = cap;
   plan.forced_chunk_triangles = needs.forced_chunk_triangles;
   plan.process_bytes = kProcessBytes;
-  plan.document_bytes = needs.document_bytes;
+  plan.document_bytes = needs.document_bytes + needs.pose_bytes;
   plan.tables_bytes = (largest.triangles * kPageBytesPerTriangle / needs.treelet_bytes + 2 + needs.objects.size()) *
                           kTreeletBytes +
                       needs.instances * kInstanceBytes + needs.emitters * kEmitterBytes;
@@ -89,6 +89,7 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
   const uint64_t resident = plan.process_bytes + plan.document_bytes + plan.tables_bytes + plan.coverage_bytes +
                             plan.writing_bytes;
   if (resident >= cap) return false;
+  if (plan.process_bytes + plan.document_bytes + kThreadBytes + needs.decompress_bytes > cap) return false;
   // Shares that follow the cap alone; how many threads there are only says how much of a share is used.
   const uint64_t threads_share = std::max(kThreadBytes, (cap - resident) / 16);
   if (threads_share >= cap - resident || needs.image_bytes > cap - resident - kThreadBytes) return false;
@@ -98,7 +99,7 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
   plan.threads_bytes = plan.threads * kThreadBytes;
   const uint64_t page = page_in_flight_bytes(needs.treelet_bytes, largest.layout);
   const uint64_t pages_share = std::max(2 * page, left / 8);
-  const uint64_t lane = ObjectSource::lane_bytes(largest.layout);
+  const uint64_t lane = ObjectSource::lane_bytes(largest.layout, needs.pose_windows);
   const uint64_t lanes_share = std::max(lane, left / 4);
   if (pages_share + largest.least_bytes > left || lanes_share > left) return false;
   plan.pages_in_flight = static_cast<uint32_t>(std::min<uint64_t>(pages_share / page, 2 * plan.threads));
@@ -180,6 +181,16 @@ Status check_document(uint64_t bytes, uint64_t cap_bytes, const std::string& pat
                fmt::format("{}: building needs {} MiB at least to read the document, the memory cap is {} MiB; {} MiB "
                            "are enough for it and its instances",
                            path, (kProcessBytes + bytes) / kMiB + 1, cap_bytes >> 20, enough / kMiB + 1)};
+}
+
+Status check_instances(uint64_t instances, uint64_t document_bytes, uint64_t cap_bytes, const std::string& path) {
+  // Documents are refused before, where they alone are too large; few instances leave it to the plan to name the cap.
+  constexpr uint64_t kFewInstances = 4096;
+  const uint64_t needed = kProcessBytes + document_bytes + instances * kInstanceBytes;
+  if (instances <= kFewInstances || needed <= cap_bytes) return {};
+  return Error{ErrorCode::kMemoryCap,
+               fmt::format("{}: building needs {} MiB at least for its {} instances, the memory cap is {} MiB", path,
+                           (needed + kPageWriterBytes) / kMiB + 1, instances, cap_bytes >> 20)};
 }
 
 }  // namespace shoal

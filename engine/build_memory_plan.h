@@ -25,6 +25,9 @@ struct BuildMemoryNeeds {
   uint64_t instances = 0, emitters = 0;  ///< at most
   uint64_t coverage_bytes = 0;           ///< alpha of all levels that are kept
   uint64_t image_bytes = 0;              ///< while the largest image is tiled
+  uint64_t decompress_bytes = 0;         ///< while the largest compressed view or mesh is decoded, before all else
+  uint64_t pose_bytes = 0;               ///< pose_bytes(): resident while building
+  uint32_t pose_windows = 0;             ///< of the primitive that is morphed or skinned by most accessors
   uint32_t treelet_bytes = 0;
   unsigned threads = 1;
   uint64_t forced_chunk_triangles = 0;   ///< 0: from the plan
@@ -60,5 +63,7 @@ Result<BuildMemoryPlan> plan_build_memory(const BuildMemoryNeeds& needs, uint64_
 Result<uint64_t> document_bytes(FileSystem& fs, const std::string& path);
 /// Refuses a document that cannot be read within the cap. Small ones are read in any case: the plan names the cap then.
 Status check_document(uint64_t bytes, uint64_t cap_bytes, const std::string& path);
+/// Refuses more instances than can be listed within the cap, before they are. Fails with: kMemoryCap.
+Status check_instances(uint64_t instances, uint64_t document_bytes, uint64_t cap_bytes, const std::string& path);
 
 }  // namespace shoal

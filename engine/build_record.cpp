@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <bit>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -43,6 +44,8 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
   SHOAL_RETURN_IF_ERROR(sources.add_parts(document));
   SourceHash hash(source_hash(sources, true));
   hash.add(options.treelet_bytes);
+  SHOAL_ASSIGN_OR_RETURN(const auto pose, choose_pose(document, options.pose));
+  if (pose) hash.add(pose->animation), hash.add(std::bit_cast<uint64_t>(pose->time + 0.0));
   hash.add(kSceneVersion);
   if (!options.variant.empty()) hash.add(XXH3_64bits(options.variant.data(), options.variant.size()));
   hash.add(XXH3_64bits(kBuilderVersion, std::char_traits<char>::length(kBuilderVersion)));
@@ -50,7 +53,8 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
 }
 
 std::string build_record_json(const gltf::Document& document, const SceneHeader& header,
-                              const SceneBuildReport& report, const std::string& variant) {
+                              const SceneBuildReport& report, const std::optional<ChosenPose>& pose,
+                              const std::string& variant) {
   Json json;
   json["shoal_version"] = kBuilderVersion;
   json["scene_version"] = header.version;
@@ -58,6 +62,11 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
   json["content_hash"] = fmt::format("{:016x}", header.content_hash);
   json["options"] = {{"treelet_bytes", header.treelet_bytes}};
   if (!variant.empty()) json["options"]["variant"] = variant;
+  if (pose) {
+    json["options"]["animation"] = pose->animation;
+    json["options"]["animation_name"] = pose->name;
+    json["options"]["time"] = pose->time;
+  }
   json["triangles_count"] = header.triangles_count;
   json["instanced_triangles_count"] = header.instanced_triangles_count;
   json["degenerate_count"] = header.degenerate_count;

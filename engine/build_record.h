@@ -14,14 +14,15 @@
 namespace shoal {
 
 inline constexpr const char* kBuilderVersion = "0.1.0";
-inline constexpr uint32_t kSceneVersion = 3;  ///< SceneHeader::version
+inline constexpr uint32_t kSceneVersion = 4;  ///< SceneHeader::version
 
 /// Hash of the JSON and of the sizes of the files it names; with `modification_times` of those too. A file that is
 /// missing counts as such.
 uint64_t source_hash(const SourceFiles& sources, bool modification_times);
 
 std::string build_record_json(const gltf::Document& document, const SceneHeader& header,
-                              const SceneBuildReport& report, const std::string& variant);
+                              const SceneBuildReport& report, const std::optional<ChosenPose>& pose,
+                              const std::string& variant);
 /// `lights` and `cameras` in the order of their tables.
 std::string names_json(const gltf::Document& document, const FlatScene& scene, bool default_material);
 

@@ -18,6 +18,7 @@
 #include "engine/process_memory.h"
 #include "engine/scene_writer.h"
 #include "engine/tile_textures.h"
+#include "io/decompress_document.h"
 
 namespace shoal {
 
@@ -43,12 +44,14 @@ class SceneBuilder {
     if (scratch_folder_.empty()) scratch_folder_ = std::filesystem::path(output).parent_path().string();
     if (scratch_folder_.empty()) scratch_folder_.push_back('.');
     SHOAL_RETURN_IF_ERROR(read_document());
+    SHOAL_RETURN_IF_ERROR(decompress_document());
     gltf::BufferFiles files(fs_, document_);
-    SHOAL_ASSIGN_OR_RETURN(geometry_, plan_geometry(files, document_, flat_));
-    SHOAL_ASSIGN_OR_RETURN(materials_, plan_materials(document_, geometry_.uses));
+    SHOAL_RETURN_IF_ERROR(pose_document(files, document_, pose_, report_.warnings));
+    SHOAL_RETURN_IF_ERROR(plan(files, true));
+    note(flat_.warnings);
     note(geometry_.warnings);
     note(materials_.warnings);
-    SHOAL_RETURN_IF_ERROR(plan_memory(files));
+    if (options_.planned) options_.planned(memory_);
     tbb::task_arena planned_threads(static_cast<int>(memory_.threads));
     SHOAL_RETURN_IF_ERROR(planned_threads.execute([&] { return build(files, output); }));
     report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -94,23 +97,56 @@ class SceneBuilder {
     if (!options_.variant.empty()) SHOAL_RETURN_IF_ERROR(gltf::select_variant(document_, options_.variant));
     SHOAL_RETURN_IF_ERROR(sources_.add_parts(document_));
     note(document_.warnings);
-    SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
-    note(flat_.warnings);
+    SHOAL_ASSIGN_OR_RETURN(pose_, choose_pose(document_, options_.pose));
+    SHOAL_RETURN_IF_ERROR(check_instances(count_placed_meshes(document_), document_bytes_, cap_bytes(), path_));
+    pose_bytes_ = pose_bytes(document_);
+    SHOAL_RETURN_IF_ERROR(check_document(document_bytes_ + pose_bytes_, cap_bytes(), path_));
     progress("reading", 1);
     return {};
+  }
+
+  /// What is where, made of what, and how the cap is shared out; before anything of size is read. `readable`: nothing is
+  /// compressed, and instances have their places.
+  Status plan(gltf::BufferFiles& files, bool readable) {
+    SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
+    if (readable) SHOAL_RETURN_IF_ERROR(place_instancings(files, document_, flat_));
+    SHOAL_ASSIGN_OR_RETURN(geometry_, plan_geometry(readable ? &files : nullptr, document_, flat_));
+    SHOAL_ASSIGN_OR_RETURN(materials_, plan_materials(document_, geometry_.uses));
+    return plan_memory(files);
+  }
+
+  /// Decodes what the document holds compressed, once a plan says that there is memory for it and for what follows.
+  Status decompress_document() {
+    const gltf::CompressionNeeds needs = gltf::compression_needs(document_, animation());
+    if (needs.memory_bytes == 0) return {};
+    decompress_bytes_ = needs.memory_bytes;
+    gltf::BufferFiles files(fs_, document_);
+    SHOAL_RETURN_IF_ERROR(plan(files, false));
+    progress("decompressing", 0);
+    SHOAL_RETURN_IF_ERROR(gltf::decompress(fs_, scratch_folder_, options_.stop, document_, animation()));
+    give_back_freed_memory();
+    progress("decompressing", 1);
+    return {};
+  }
+
+  std::optional<uint32_t> animation() const {
+    return pose_ ? std::optional(pose_->animation) : std::nullopt;
   }
 
   uint64_t cap_bytes() const {
     return options_.max_memory_bytes > 0 ? options_.max_memory_bytes : default_cap_bytes();
   }
 
-  /// Shares the cap out, before anything of size is read.
+  /// Shares the cap out.
   Status plan_memory(gltf::BufferFiles& files) {
     BuildMemoryNeeds needs;
     SHOAL_ASSIGN_OR_RETURN(const ImageNeeds images, measure_images(fs_, files, document_, materials_.textures, options_.limits.image_pixels));
     needs.image_bytes = images.largest_bytes;
     needs.coverage_bytes = images.coverage_bytes;
     needs.document_bytes = document_bytes_;
+    needs.decompress_bytes = decompress_bytes_;
+    needs.pose_bytes = pose_bytes_;
+    needs.pose_windows = most_pose_windows(document_, geometry_);
     for (const ObjectPlan& object : geometry_.objects) {
       needs.objects.push_back(
           {object_triangles(geometry_, object), object_layout(document_, geometry_, object, materials_)});
@@ -123,7 +159,6 @@ class SceneBuilder {
     needs.threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
     needs.forced_chunk_triangles = options_.chunk_triangles;
     SHOAL_ASSIGN_OR_RETURN(memory_, plan_build_memory(needs, cap_bytes(), path_));
-    if (options_.planned) options_.planned(memory_);
     return {};
   }
 
@@ -258,7 +293,7 @@ class SceneBuilder {
       report_.warnings.push_back(fmt::format("and {} more warnings", more));
     }
     SHOAL_ASSIGN_OR_RETURN(const TopTables top, assemble_top_tree(built_, std::move(placed_)));
-    const std::string record = build_record_json(document_, header, report_, options_.variant);
+    const std::string record = build_record_json(document_, header, report_, pose_, options_.variant);
     const std::string names = names_json(document_, flat_, materials_.default_material != kNoIndex);
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kBuildRecord, std::as_bytes(std::span(record))));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kSceneHeader, std::vector{header}));
@@ -292,10 +327,11 @@ class SceneBuilder {
   std::vector<std::vector<Emitter>> emitters_of_;  // likewise, object space
   std::vector<PlacedInstance> placed_;
   std::vector<Emitter> emitters_;
+  std::optional<ChosenPose> pose_;
   BuildMemoryPlan memory_;
   std::optional<SourceConsumer> consumer_;
   std::string scratch_folder_;
-  uint64_t document_bytes_ = 0, total_triangles_ = 0;
+  uint64_t document_bytes_ = 0, pose_bytes_ = 0, decompress_bytes_ = 0, total_triangles_ = 0;
   std::vector<std::pair<std::string, uint64_t>> stages_;  // triangles done
 };
 

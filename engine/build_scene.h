@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "engine/build_memory_plan.h"
+#include "engine/pose_document.h"
 #include "io/gltf_document.h"
 #include "io/result.h"
 
 namespace shoal {
 
 struct BuildProgress {
-  const char* stage = "";  ///< "reading", "textures", "measuring", "counting", "sorting", "building", "writing"
+  const char* stage = "";  ///< "reading", "decompressing", "textures", "measuring", "counting", "sorting", "building", "writing"
   double fraction = 0;     ///< of the stage
 };
 
@@ -28,6 +29,7 @@ struct SceneBuildOptions {
   /// Gives the space of the source's binary parts back as soon as each was read for the last time. Destroys the source,
   /// also when the build fails or is stopped later on. Not for .glb.
   bool consume = false;
+  PoseOptions pose;               ///< the time that skins, morph targets and nodes are posed at
   uint64_t chunk_triangles = 0;   ///< triangles built at once; 0: from the memory plan (else for tests)
   std::string variant;            ///< KHR_materials_variants, by name; empty: the materials as they are
   gltf::Limits limits;
@@ -54,7 +56,7 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
                                      const SceneBuildOptions& options);
 
 /// What a built scene is kept under: a hash of the JSON, of sizes and modification times of the files it names, of
-/// treelet size, variant and builder version; not of the cap, which changes the tree but never the picture.
+/// treelet size, pose, variant and builder version; not of the cap, which changes the tree but never the picture.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

@@ -1,6 +1,7 @@
 // Camera rays: a pixel sample becomes an origin and a direction. Pure functions of their arguments.
 #pragma once
 
+#include "engine/lens.h"
 #include "engine/sampler.h"
 #include "engine/scene.h"
 
@@ -8,20 +9,33 @@ namespace shoal {
 
 struct CameraRay {
   Vec3 origin, direction;  ///< world space, direction of unit length
+  bool seen = true;        ///< false: the lens shows nothing here, the sample stays black and clear
 };
 
 class Camera {
  public:
   /// `record` with a film of width x height; glTF's yfov is vertical; a film wider or higher than the camera's
-  /// aspect ratio keeps the vertical angle.
-  Camera(const CameraRecord& record, uint32_t width, uint32_t height);
-  /// Box filter one pixel wide: the point is uniform in the pixel. Pixel rows run from the top.
-  CameraRay ray(uint32_t x, uint32_t y, const Random4& random) const;
+  /// aspect ratio keeps the vertical angle. Requires: check_lens().
+  Camera(const CameraRecord& record, uint32_t width, uint32_t height, const LensOptions& lens = {});
+  /// Whether ray() looks at the numbers for the lens.
+  bool has_aperture() const { return lens_radius_ > 0; }
+  /// Box filter one pixel wide: the point is uniform in the pixel. Pixel rows run from the top. `lens` is for the point
+  /// on the aperture.
+  CameraRay ray(uint32_t x, uint32_t y, const Random4& random, const Random4& lens = {}) const;
 
  private:
+  CameraRay flat_ray(float u, float v, const Random4& lens) const;
+  CameraRay equirectangular_ray(float u, float v) const;
+  CameraRay fisheye_ray(float u, float v) const;
+  CameraRay through_lens(const Vec3& origin, const Vec3& towards, const Random4& lens) const;
+
   Affine3 camera_to_world_;
-  bool perspective_;
+  Projection projection_;
+  bool plain_;               ///< perspective or orthographic through a pinhole, without distortion
   float scale_x_, scale_y_;  ///< half-size of the film at distance 1 (orthographic: half-size in units)
+  float lens_radius_ = 0, focus_distance_ = 0;
+  float half_fov_ = 0;       ///< fisheye: radians at the circle's rim
+  Distortion distortion_;
   uint32_t width_, height_;
 };
 

@@ -179,7 +179,7 @@ class TableChecker {
   const char* light(const PunctualLight& l) {
     if (l.type > PunctualType::kSpot) return "a known type";
     const bool numbers = finite(l.position) && finite(l.direction) && finite(l.intensity) &&
-                         std::isfinite(l.cos_inner) && std::isfinite(l.cos_outer);
+                         std::isfinite(l.cos_inner) && std::isfinite(l.cos_outer) && std::isfinite(l.range);
     return numbers ? nullptr : "finite numbers";
   }
 

@@ -21,6 +21,11 @@ std::set<uint32_t> buffers_of(const gltf::Document& document, const gltf::Primit
     buffers.insert(document.views[accessor.sparse->values_view].buffer);
   };
   for (const auto& [name, accessor] : primitive.attributes) add(accessor);
+  for (const gltf::MorphTarget& target : primitive.targets) {
+    for (const auto& accessor : {target.position, target.normal, target.tangent}) {
+      if (accessor) add(*accessor);
+    }
+  }
   if (primitive.indices) add(*primitive.indices);
   return buffers;
 }

@@ -261,6 +261,7 @@ void write_light(JsonText& json, const gltf::Light& light) {
   json.member("type", kTypes[static_cast<size_t>(light.type)]);
   json.array("color", light.color);
   json.member("intensity", light.intensity);
+  if (light.range > 0) json.member("range", light.range);
   if (light.type == gltf::LightType::kSpot) {
     json.key("spot");
     json.open('{');

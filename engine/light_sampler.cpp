@@ -44,6 +44,13 @@ float spot_attenuation(const PunctualLight& light, float cosine) {
   return x * x;
 }
 
+/// What KHR_lights_punctual recommends for lights with a range: clamp(1 - (distance / range)^4).
+double range_attenuation(const PunctualLight& light, double distance2) {
+  if (!(light.range > 0)) return 1;
+  const double ratio2 = distance2 / (static_cast<double>(light.range) * light.range);
+  return std::max(0.0, 1 - ratio2 * ratio2);
+}
+
 }  // namespace
 
 double emitter_area(const Emitter& emitter) { return 0.5 * glm::length(doubled_area_vector(emitter)); }
@@ -128,7 +135,7 @@ LightSample LightSampler::sample_punctual(const PunctualLight& light, const Vec3
   const double distance2 = glm::dot(to_light, to_light);
   if (!(distance2 > 0)) return {};
   sample.direction = Vec3(to_light / std::sqrt(distance2));
-  sample.radiance *= static_cast<float>(1 / distance2);
+  sample.radiance *= static_cast<float>(range_attenuation(light, distance2) / distance2);
   if (light.type == PunctualType::kSpot) {
     sample.radiance *= spot_attenuation(light, -glm::dot(vector3(light.direction), sample.direction));
   }

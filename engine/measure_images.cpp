@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "engine/tile_textures.h"
+#include "io/webp_image.h"
 
 namespace shoal {
 namespace {
@@ -68,6 +69,10 @@ ImageHeader read_image_header(std::span<const std::byte> bytes) {
     return {big_endian(bytes, 16, 4), big_endian(bytes, 20, 4), true};
   }
   if (bytes.size() >= 2 && bytes[0] == std::byte{0xff} && bytes[1] == std::byte{0xd8}) return read_jpeg_header(bytes);
+  if (is_webp(bytes)) {
+    const WebpSize size = read_webp_size(bytes);
+    return {size.width, size.height, size.has_alpha};
+  }
   return {};
 }
 

@@ -24,7 +24,7 @@ struct ImageHeader {
   uint32_t width = 0, height = 0;
   bool may_have_alpha = false;
 };
-/// Of a PNG or JPEG; zero where `bytes`, its beginning, does not say.
+/// Of a PNG, JPEG or WebP; zero where `bytes`, its beginning, does not say.
 ImageHeader read_image_header(std::span<const std::byte> bytes);
 
 }  // namespace shoal

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "engine/vertex_pose.h"
+
 namespace shoal {
 
 namespace {
@@ -43,7 +47,7 @@ void group_objects(GeometryPlan& plan) {
 
 }  // namespace
 
-Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document,
+Result<GeometryPlan> plan_geometry(gltf::BufferFiles* files, const gltf::Document& document,
                                    const FlatScene& scene) {
   GeometryPlan plan;
   plan.meshes.resize(document.meshes.size());
@@ -59,7 +63,8 @@ Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Documen
         ++others;
         continue;
       }
-      SHOAL_ASSIGN_OR_RETURN(const auto stream, gltf::TriangleStream::open(files, document, primitive));
+      SHOAL_ASSIGN_OR_RETURN(const auto stream, files ? gltf::TriangleStream::open(*files, document, primitive)
+                                                      : gltf::TriangleStream::describe(document, primitive));
       if (stream.count() == 0) continue;
       if (stream.count() > kMaxTriangles - triangles) {
         return Error{
@@ -89,6 +94,17 @@ CornerLayout object_layout(const gltf::Document& document, const GeometryPlan& g
     }
   }
   return layout;
+}
+
+uint32_t most_pose_windows(const gltf::Document& document, const GeometryPlan& geometry) {
+  uint32_t most = 0;
+  for (const MeshPlan& plan : geometry.meshes) {
+    for (const PrimitiveSource& source : plan.primitives) {
+      const gltf::Mesh& mesh = document.meshes[source.mesh];
+      most = std::max(most, VertexPose::window_count(mesh, mesh.primitives[source.primitive]));
+    }
+  }
+  return most;
 }
 
 uint64_t object_triangles(const GeometryPlan& geometry, const ObjectPlan& object) {

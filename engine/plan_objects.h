@@ -30,12 +30,15 @@ struct GeometryPlan {
 };
 
 /// Global primitive ids count (mesh in document order, primitive, triangle) over the meshes shown.
+/// `files`: null where what is compressed was not decompressed yet: nothing is read then.
 /// Fails with: kInput (more triangles than ids, a primitive's accessors).
-Result<GeometryPlan> plan_geometry(gltf::BufferFiles& files, const gltf::Document& document,
+Result<GeometryPlan> plan_geometry(gltf::BufferFiles* files, const gltf::Document& document,
                                    const FlatScene& scene);
 
 CornerLayout object_layout(const gltf::Document& document, const GeometryPlan& geometry, const ObjectPlan& object,
                            const MaterialPlan& materials);
+/// Windows that the primitive which is morphed or skinned by most accessors takes (VertexPose::window_count).
+uint32_t most_pose_windows(const gltf::Document& document, const GeometryPlan& geometry);
 uint64_t object_triangles(const GeometryPlan& geometry, const ObjectPlan& object);
 
 }  // namespace shoal

@@ -4,68 +4,17 @@
 
 #include <algorithm>
 
+#include "engine/vertex_pose.h"
+
 namespace shoal {
 
 namespace {
-
-constexpr uint64_t kChunkTriangles = 8192;
-/// A chunk whose indices span more vertices than this is gathered one vertex at a time.
-constexpr uint64_t kMaxWindowVertices = 4 * 3 * kChunkTriangles;
 
 std::optional<uint32_t> find_attribute(const gltf::Primitive& primitive, const std::string& name) {
   const auto found = primitive.attributes.find(name);
   if (found == primitive.attributes.end()) return std::nullopt;
   return found->second;
 }
-
-/// The vertices of one attribute that a chunk of triangles uses.
-class AttributeWindow {
- public:
-  static Result<AttributeWindow> open(gltf::BufferFiles& files, const gltf::Document& document, uint32_t accessor,
-                                      const std::string& place, uint32_t min_components, uint32_t max_components,
-                                      uint64_t vertex_count) {
-    AttributeWindow window;
-    SHOAL_ASSIGN_OR_RETURN(gltf::AccessorReader reader, gltf::AccessorReader::open(files, document, accessor));
-    window.width_ = reader.components();
-    if (window.width_ < min_components || window.width_ > max_components || document.accessors[accessor].matrix) {
-      return Error{ErrorCode::kInput, fmt::format("{}: {}: expected {} to {} components, found {}", document.path,
-                                                  place, min_components, max_components, window.width_)};
-    }
-    if (reader.count() < vertex_count) {
-      return Error{ErrorCode::kInput, fmt::format("{}: {}: expected {} vertices as in POSITION, found {}",
-                                                  document.path, place, vertex_count, reader.count())};
-    }
-    window.reader_.emplace(std::move(reader));
-    return window;
-  }
-
-  Status load_run(uint64_t first, uint64_t count) {
-    values_.resize(count * width_);
-    return reader_->read_floats(first, count, values_);
-  }
-  Status load_each(std::span<const uint32_t> vertices) {
-    values_.resize(vertices.size() * width_);
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      SHOAL_RETURN_IF_ERROR(reader_->read_floats(vertices[i], 1, std::span(values_).subspan(i * width_, width_)));
-    }
-    return {};
-  }
-  uint32_t width() const { return width_; }
-  size_t count() const { return values_.size() / width_; }
-  float* vertex(size_t i) { return &values_[i * width_]; }
-  const float* vertex(size_t i) const { return &values_[i * width_]; }
-  /// Component c, or `missing` when there is none or it is not finite.
-  float value(size_t i, uint32_t c, float missing) const {
-    if (c >= width_) return missing;
-    const float v = values_[i * width_ + c];
-    return std::isfinite(v) ? v : missing;
-  }
-
- private:
-  std::optional<gltf::AccessorReader> reader_;
-  uint32_t width_ = 0;
-  std::vector<float> values_;
-};
 
 void move_points(AttributeWindow& window, const AffineDouble& map) {
   for (size_t i = 0; i < window.count(); ++i) {
@@ -105,7 +54,8 @@ struct PrimitiveReader::State {
   template <class Function>
   Status each_window(Function function);
   Status load(std::vector<uint32_t>& of_corners);
-  void move();
+  Status move();
+  bool is_mirrored(size_t place) const { return turned.empty() ? mirrored : turned[place] != 0; }
   void append(const uint32_t* corners, uint32_t id, TriangleBlock& block) const;
   void append_corner(size_t place, std::vector<float>& corners) const;
   bool wants_tangent() const { return plan.wants_tangents(material); }
@@ -120,6 +70,8 @@ struct PrimitiveReader::State {
   AffineDouble points, normals;
   std::optional<gltf::TriangleStream> stream;
   std::optional<AttributeWindow> position, normal, tangent, color, uv[kMaxUvSets];
+  std::optional<VertexPose> pose;
+  std::vector<uint8_t> turned;  // of a skinned mesh, for each vertex: its map mirrors
   std::vector<uint32_t> indices;
 };
 
@@ -141,6 +93,11 @@ Status PrimitiveReader::State::open_attributes(gltf::BufferFiles& files, uint64_
   for (uint32_t set = 0; set < std::min<uint32_t>(sets.count, layout.uv_count); ++set) {
     SHOAL_RETURN_IF_ERROR(open(fmt::format("TEXCOORD_{}", sets.texcoord[set]), 2, 2, uv[set]));
   }
+  const gltf::Mesh& mesh = document.meshes[source.mesh];
+  if (!VertexPose::needed(mesh, primitive)) return {};
+  const std::string place = fmt::format("meshes[{}].primitives[{}]", source.mesh, source.primitive);
+  SHOAL_ASSIGN_OR_RETURN(pose, VertexPose::open(files, document, mesh, primitive, place, normal.has_value(),
+                                                tangent.has_value(), vertex_count));
   return {};
 }
 
@@ -149,7 +106,7 @@ Status PrimitiveReader::State::each_window(Function function) {
   for (std::optional<AttributeWindow>* window : {&position, &normal, &tangent, &color, &uv[0], &uv[1], &uv[2], &uv[3]}) {
     if (*window) SHOAL_RETURN_IF_ERROR(function(**window));
   }
-  return {};
+  return pose ? pose->each_window(function) : Status();
 }
 
 /// Loads the vertices of some triangles and turns their indices into places in the windows.
@@ -166,14 +123,20 @@ Status PrimitiveReader::State::load(std::vector<uint32_t>& of_corners) {
   return {};
 }
 
-void PrimitiveReader::State::move() {
+/// Morph targets first, then the skin or the node's place (glTF 2.0, section 3.7.2.2).
+Status PrimitiveReader::State::move() {
+  const auto pointer = [](std::optional<AttributeWindow>& window) { return window ? &*window : nullptr; };
+  if (pose) pose->morph(*position, pointer(normal), pointer(tangent));
+  if (pose && pose->skinned()) return pose->skin(*position, pointer(normal), pointer(tangent), turned);
   if (moved) move_points(*position, points);
   if (normal) move_directions(*normal, normals, mirrored ? -1 : 1);
   if (tangent) move_directions(*tangent, points, 1);
+  return {};
 }
 
 void PrimitiveReader::State::append(const uint32_t* corners, uint32_t id, TriangleBlock& block) const {
-  const uint32_t places[3] = {corners[0], corners[mirrored ? 2 : 1], corners[mirrored ? 1 : 2]};
+  const bool turn = is_mirrored(corners[0]);
+  const uint32_t places[3] = {corners[0], corners[turn ? 2 : 1], corners[turn ? 1 : 2]};
   const float* p[3];
   bool usable = true;
   for (int k = 0; k < 3; ++k) {
@@ -202,7 +165,7 @@ void PrimitiveReader::State::append_corner(size_t place, std::vector<float>& cor
   if (layout.normal) put(normal, 3, 0);
   if (layout.tangent) {
     put(tangent, 4, 0);
-    if (tangent && mirrored) corners.back() = -corners.back();
+    if (tangent && is_mirrored(place)) corners.back() = -corners.back();
   }
   if (layout.color) put(color, 4, 1);
   for (uint32_t set = 0; set < layout.uv_count; ++set) put(uv[set], 2, 0);
@@ -225,12 +188,12 @@ Result<PrimitiveReader> PrimitiveReader::open(gltf::BufferFiles& files, const gl
 Status PrimitiveReader::read(uint64_t first, uint64_t count, TriangleBlock& block) {
   State& s = *state_;
   block.clear(s.layout, count);
-  for (const uint64_t end = first + count; first < end; first += kChunkTriangles) {
-    const uint64_t n = std::min(kChunkTriangles, end - first);
+  for (const uint64_t end = first + count; first < end; first += kWindowTriangles) {
+    const uint64_t n = std::min(kWindowTriangles, end - first);
     s.indices.resize(3 * n);
     SHOAL_RETURN_IF_ERROR(s.stream->read(first, n, s.indices));
     SHOAL_RETURN_IF_ERROR(s.load(s.indices));
-    s.move();
+    SHOAL_RETURN_IF_ERROR(s.move());
     for (uint64_t i = 0; i < n; ++i) {
       s.append(&s.indices[3 * i], s.source.first_id + static_cast<uint32_t>(first + i), block);
     }
@@ -248,10 +211,11 @@ void TriangleBlock::clear(CornerLayout layout, uint64_t expected) {
   degenerate_count = 0;
 }
 
-uint64_t PrimitiveReader::memory_bytes(CornerLayout layout) {
+uint64_t PrimitiveReader::memory_bytes(CornerLayout layout, uint32_t pose_windows) {
   // For the indices, the positions and each attribute the accessor's blocks and a window; then the indices in hand.
   const uint64_t readers = 2ull + layout.normal + layout.tangent + layout.color + layout.uv_count;
-  return readers * gltf::kReaderBytes + 4 * kMaxWindowVertices * (3 + layout.floats()) + 3 * 4 * kChunkTriangles;
+  const uint64_t pose = pose_windows * AttributeWindow::memory_bytes(4) + (pose_windows > 0 ? kMaxWindowVertices : 0);
+  return readers * gltf::kReaderBytes + 4 * kMaxWindowVertices * (3 + layout.floats()) + 3 * 4 * kWindowTriangles + pose;
 }
 
 CornerLayout layout_of(const gltf::Primitive& primitive, const MaterialPlan& plan) {

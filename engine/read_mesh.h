@@ -42,7 +42,8 @@ class PrimitiveReader {
  public:
   /// `layout` says which attributes are read (none: positions only). `bake` moves the triangles (null: object space is
   /// kept). A map that mirrors swaps the last two corners, so that the front stays where corners run counter-clockwise
-  /// (glTF 2.0, section 3.7.4); normals go by the inverse transpose, a tangent's handedness turns with the mirror.
+  /// (glTF 2.0, section 3.7.4); normals go by the inverse transpose, a tangent's handedness turns with the mirror. A
+  /// skinned primitive goes by its joints alone (engine/vertex_pose).
   /// Fails with: kInput (an attribute of the wrong type or too short), kStorage.
   static Result<PrimitiveReader> open(gltf::BufferFiles& files, const gltf::Document& document,
                                       const MaterialPlan& plan, const PrimitiveSource& source, CornerLayout layout,
@@ -54,8 +55,8 @@ class PrimitiveReader {
   /// Triangles [first, first + count) of the primitive. Fails with: kInput (an index out of range), kStorage.
   Status read(uint64_t first, uint64_t count, TriangleBlock& block);
 
-  /// At most, for such a layout.
-  static uint64_t memory_bytes(CornerLayout layout);
+  /// At most, for such a layout and so many windows of morph targets, joints and weights.
+  static uint64_t memory_bytes(CornerLayout layout, uint32_t pose_windows);
 
  private:
   struct State;

@@ -109,8 +109,10 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   execution.paging.read_depth = plan.read_depth;
   if (hooks.planned) hooks.planned(plan);
 
-  const Camera camera(scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera],
-                      picture.width, picture.height);
+  const CameraRecord seen_by =
+      scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
+  SHOAL_RETURN_IF_ERROR(check_lens(seen_by, picture.lens));
+  const Camera camera(seen_by, picture.width, picture.height, picture.lens);
   const bool previewed = !execution.preview.path.empty();
   const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample,
                             previewed ? coarse_levels(plan) : 0);

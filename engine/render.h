@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/counters.h"
+#include "engine/lens.h"
 #include "engine/memory_plan.h"
 #include "engine/phase_clock.h"
 #include "engine/scene.h"
@@ -27,6 +28,7 @@ struct PictureOptions {
   uint32_t width = 512, height = 512;
   uint32_t samples = 16;
   uint32_t camera = 0;  ///< index among the scene's cameras; a scene without one is framed
+  LensOptions lens;     ///< what the picture asks of the camera beyond its record
   uint32_t tile_sample = 1;  ///< for measuring: one in so many 32 x 32 tiles is rendered, the others stay black
   ShadingOptions shading;
 };

@@ -109,12 +109,31 @@ std::string environment_text(const EnvironmentOptions& environment) {
   return fmt::format("constant:{},{},{}", radiance.x, radiance.y, radiance.z);
 }
 
+Json lens_json(const Scene& scene, const PictureOptions& picture) {
+  static constexpr const char* kNames[] = {"scene", "perspective", "orthographic", "equirectangular", "fisheye"};
+  const LensOptions& lens = picture.lens;
+  const CameraRecord record =
+      scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
+  Json json = {{"projection", kNames[static_cast<size_t>(projection_of(record, lens))]}};
+  if (lens.fov_degrees > 0) json["fov_degrees"] = lens.fov_degrees;
+  if (lens.height > 0) json["height"] = lens.height;
+  if (lens.aperture > 0) json["aperture"] = lens.aperture;
+  if (lens.f_stop > 0) json["f_stop"] = lens.f_stop;
+  if (lens.focus_distance > 0) json["focus_distance"] = lens.focus_distance;
+  if (lens.distortion.model != DistortionModel::kNone) {
+    json["distortion_model"] = lens.distortion.model == DistortionModel::kRadial ? "radial" : "brown";
+    json["distortion"] = lens.distortion.k;
+  }
+  return json;
+}
+
 Json options_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
                   const ExecutionOptions& execution) {
   return {{"width", picture.width},
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
           {"camera", picture.camera},
+          {"lens", lens_json(scene, picture)},
           {"tile_sample", picture.tile_sample},
           {"bounces", picture.shading.bounces},
           {"seed", picture.shading.seed},
@@ -158,15 +177,18 @@ ExrImage picture_image(const RenderResult& result, const Scene& scene, const Pic
     for (size_t i = 0; i < pixels; ++i) channel.values[i] = result.rgba[i * 4 + c];
     image.channels.push_back(std::move(channel));
   }
-  const CameraRecord camera =
+  const CameraRecord record =
       scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
+  const CameraRecord camera = seen_through(record, picture.lens);
   const float aspect = static_cast<float>(picture.width) / static_cast<float>(picture.height);
   const Matrix to_camera = world_to_camera(camera.camera_to_world);
   image.text["software"] = "Shoal " SHOAL_VERSION;
   image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
   image.numbers["samplesPerPixel"] = static_cast<float>(picture.samples);
   image.matrices["worldToCamera"] = to_camera;
-  image.matrices["worldToNDC"] = multiply(to_camera, camera_to_ndc(camera, aspect));
+  const Projection projection = projection_of(record, picture.lens);
+  const bool flat = projection == Projection::kPerspective || projection == Projection::kOrthographic;
+  if (flat) image.matrices["worldToNDC"] = multiply(to_camera, camera_to_ndc(camera, aspect));
   return image;
 }
 

@@ -27,6 +27,9 @@ void tell_sanitizer_before(const void* /*place*/) {}
 void tell_sanitizer_after(const void* /*place*/) {}
 #endif
 
+/// The length of a ray that enters no box.
+constexpr float kRayNowhere = -1;
+
 }  // namespace
 
 void RenderContext::fail(Error new_error) {
@@ -92,15 +95,19 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.radiance = Vec3(0);
   path.shadow_radiance = Vec3(0);
   const uint64_t seed = context_.picture.shading.seed;
-  const CameraRay camera_ray = context_.camera.ray(
-      sample.x, sample.y, random4(seed, path.pixel, path.sample, 0, Dimension::kPixel));
+  const Random4 in_pixel = random4(seed, path.pixel, path.sample, 0, Dimension::kPixel);
+  const Random4 on_lens =
+      context_.camera.has_aperture() ? random4(seed, path.pixel, path.sample, 0, Dimension::kLens) : Random4{};
+  const CameraRay camera_ray = context_.camera.ray(sample.x, sample.y, in_pixel, on_lens);
   path.origin = camera_ray.origin;
   path.direction = camera_ray.direction;
   path.hit = Hit{};
   path.pending.store(1, std::memory_order_relaxed);
   ++counters_.samples_started_count;
   counters_.path_state_moved_bytes += sizeof(PathState);
-  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false);
+  if (!camera_ray.seen) path.throughput = Vec3(0);
+  const float t_max = camera_ray.seen ? kRayInfinity : kRayNowhere;
+  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, t_max, false);
   ++ray_counters(ray).rays_traced_count;
   return ray;
 }

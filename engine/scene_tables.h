@@ -29,7 +29,7 @@ inline constexpr TableId kTextureTransforms = 15;  ///< TextureTransform[]
 }  // namespace tables
 
 struct SceneHeader {
-  uint32_t version = 3;
+  uint32_t version = 4;
   uint32_t treelet_bytes = 0;        ///< --treelet-size of the build
   uint64_t triangles_count = 0;      ///< stored, an instanced mesh once
   uint64_t instanced_triangles_count = 0;
@@ -157,6 +157,7 @@ struct PunctualLight {
   float direction[3];      ///< the way the light goes, unit
   float intensity[3];      ///< colour times candela (point, spot) or lux (directional)
   float cos_inner, cos_outer;
+  float range = 0;         ///< point, spot: where the light ends; 0: nowhere
 };
 
 struct CameraRecord {

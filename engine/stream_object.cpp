@@ -132,9 +132,9 @@ Status ObjectSource::stream(bool with_corners, BlockTaker& taker) {
   return status;
 }
 
-uint64_t ObjectSource::lane_bytes(CornerLayout layout) {
+uint64_t ObjectSource::lane_bytes(CornerLayout layout, uint32_t pose_windows) {
   const uint64_t soup = 36 + 8 + 12ull * layout.floats();
-  return PrimitiveReader::memory_bytes(layout) + kBlockTriangles * (soup + 4 + record_bytes(layout)) + (64u << 10);
+  return PrimitiveReader::memory_bytes(layout, pose_windows) + kBlockTriangles * (soup + 4 + record_bytes(layout)) + (64u << 10);
 }
 
 Status check_stop(const std::atomic<bool>* stop, const std::string& path) {

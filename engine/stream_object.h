@@ -65,7 +65,7 @@ class ObjectSource : public TriangleSource {
   const CornerLayout& layout() const { return layout_; }
 
   /// Memory of one lane at most.
-  static uint64_t lane_bytes(CornerLayout layout);
+  static uint64_t lane_bytes(CornerLayout layout, uint32_t pose_windows);
 
  private:
   const StreamInput& input_;

@@ -9,6 +9,8 @@
 #include <map>
 #include <tuple>
 
+#include "io/decompress_document.h"
+
 namespace shoal {
 namespace {
 
@@ -125,6 +127,10 @@ class Flattener {
 Result<TileSource> open_tile_source(FileSystem& fs, const std::string& path) {
   TileSource source;
   SHOAL_ASSIGN_OR_RETURN(source.document, gltf::load_document(fs, path));
+  if (gltf::compression_needs(source.document).memory_bytes > 0) {
+    return Error{ErrorCode::kUnsupported, fmt::format("{}: its geometry is compressed, which is not copied; decompress it "
+                                                      "first, for example with `gltf-transform copy IN OUT`", path)};
+  }
   Flattener flattener(fs, source);
   for (const uint32_t root : source.document.roots) SHOAL_RETURN_IF_ERROR(flattener.visit(root, glm::dmat4(1)));
   if (source.triangles_count == 0) {

@@ -95,6 +95,9 @@ class TriangleStream {
   /// Modes other than triangles, strips and fans, and primitives without POSITION, give count() == 0.
   /// Fails with: kInput, kStorage.
   static Result<TriangleStream> open(BufferFiles& files, const Document& document, const Primitive& primitive);
+  /// The same by what the document says alone, also where bytes are still compressed: to be counted, not read.
+  /// Fails with: kInput.
+  static Result<TriangleStream> describe(const Document& document, const Primitive& primitive);
   uint64_t count() const { return count_; }
   uint64_t vertex_count() const { return vertex_count_; }
   /// Triangles [first, first + n) as 3n vertex indices. Fails with: kInput when an index is out of range.

@@ -42,7 +42,12 @@ Status BufferFiles::read(uint32_t buffer, uint64_t offset, std::span<std::byte> 
     return Error{ErrorCode::kInput, fmt::format("{}: buffers[{}]: expected bytes inside {}, found {} from {}",
                                                 document_->path, buffer, source.byte_length, out.size(), offset)};
   }
+  if (source.placeholder) {
+    return Error{ErrorCode::kInput, fmt::format("{}: buffers[{}]: expected bytes, found a fallback of "
+                                                "EXT_meshopt_compression", document_->path, buffer)};
+  }
   read_bytes_ += out.size();
+  if (source.scratch) return source.scratch->read_at(offset, out);
   if (source.path.empty()) {
     if (!out.empty()) std::memcpy(out.data(), source.embedded.data() + offset, out.size());
     return {};

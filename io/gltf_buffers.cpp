@@ -13,6 +13,9 @@ constexpr uint64_t kMaxStrideBytes = 4096;
 
 void read_buffer_source(const JsonNode& node, uint64_t i, const std::optional<FileRange>& binary,
                         Document& document, Buffer& buffer) {
+  const JsonNode meshopt = node.object("extensions").object("EXT_meshopt_compression");
+  buffer.placeholder = meshopt.boolean("fallback", false);
+  if (buffer.placeholder) return;
   const std::string uri = node.text("uri");
   if (uri.empty()) {
     if (i != 0 || !binary)
@@ -38,6 +41,68 @@ void read_buffer_source(const JsonNode& node, uint64_t i, const std::optional<Fi
   }
 }
 
+MeshoptMode read_meshopt_mode(const JsonNode& node) {
+  const std::string mode = node.text("mode");
+  if (mode == "ATTRIBUTES") return MeshoptMode::kAttributes;
+  if (mode == "TRIANGLES") return MeshoptMode::kTriangles;
+  if (mode != "INDICES") node.fail_at("mode", "ATTRIBUTES, TRIANGLES or INDICES", printable(mode));
+  return MeshoptMode::kIndices;
+}
+
+MeshoptFilter read_meshopt_filter(const JsonNode& node) {
+  const std::string filter = node.text("filter", "NONE");
+  if (filter == "OCTAHEDRAL") return MeshoptFilter::kOctahedral;
+  if (filter == "QUATERNION") return MeshoptFilter::kQuaternion;
+  if (filter == "EXPONENTIAL") return MeshoptFilter::kExponential;
+  if (filter != "NONE") node.fail_at("filter", "NONE, OCTAHEDRAL, QUATERNION or EXPONENTIAL", printable(filter));
+  return MeshoptFilter::kNone;
+}
+
+/// Whether the codec knows elements of such a size.
+bool stride_fits(const MeshoptView& packed) {
+  const uint32_t stride = packed.byte_stride;
+  if (packed.mode != MeshoptMode::kAttributes) {
+    return packed.filter == MeshoptFilter::kNone && (stride == 2 || stride == 4);
+  }
+  if (packed.filter == MeshoptFilter::kOctahedral) return stride == 4 || stride == 8;
+  if (packed.filter == MeshoptFilter::kQuaternion) return stride == 8;
+  return stride > 0 && stride % 4 == 0 && stride <= 256;
+}
+
+/// The codecs need two bits for 16 bytes at least, so a count that is no lie stays below this many times the bytes.
+constexpr uint64_t kMaxMeshoptGrowth = 64;
+
+void read_meshopt_view(const JsonNode& node, Document& document, BufferView& view) {
+  MeshoptView packed;
+  packed.buffer = node.required_index("buffer", document.buffers.size());
+  packed.byte_offset = node.whole("byteOffset", 0);
+  packed.byte_length = node.required_whole("byteLength");
+  packed.count = node.required_whole("count");
+  packed.byte_stride = static_cast<uint32_t>(node.required_whole("byteStride", 256));
+  packed.mode = read_meshopt_mode(node);
+  packed.filter = read_meshopt_filter(node);
+  if (node.failed()) return;
+  const Buffer& buffer = document.buffers[packed.buffer];
+  if (buffer.placeholder || packed.byte_offset > buffer.byte_length ||
+      packed.byte_length > buffer.byte_length - packed.byte_offset) {
+    return node.fail_at("byteLength", fmt::format("a range of the {} bytes of buffers[{}]{}", buffer.byte_length, packed.buffer,
+                                                  buffer.placeholder ? ", which is no fallback" : ""),
+                        fmt::format("{} bytes from {}", packed.byte_length, packed.byte_offset));
+  }
+  if (!stride_fits(packed) || (packed.mode == MeshoptMode::kTriangles && packed.count % 3 != 0)) {
+    return node.fail_at("byteStride", "a stride and a count that mode and filter allow",
+                        fmt::format("{} elements of {} bytes", packed.count, packed.byte_stride));
+  }
+  if (packed.count > kMaxWhole / 256 || packed.count * packed.byte_stride != view.byte_length ||
+      view.byte_length / kMaxMeshoptGrowth > packed.byte_length) {
+    return node.fail_at("count", fmt::format("the {} bytes of the view, from {} compressed ones", view.byte_length,
+                                             packed.byte_length),
+                        fmt::format("{} elements of {} bytes", packed.count, packed.byte_stride));
+  }
+  view.meshopt = static_cast<uint32_t>(document.meshopt_views.size());
+  document.meshopt_views.push_back(packed);
+}
+
 void read_views(const JsonNode& root, const Limits& limits, Document& document) {
   const JsonNode array = root.array("bufferViews", limits.objects_count);
   document.views.resize(array.size());
@@ -54,6 +119,12 @@ void read_views(const JsonNode& root, const Limits& limits, Document& document) 
       node.fail_at("byteLength",
                    fmt::format("a view inside the {} bytes of buffers[{}]", buffer_bytes, view.buffer),
                    fmt::format("{} bytes from {}", view.byte_length, view.byte_offset));
+    }
+    const JsonNode packed = node.object("extensions").object("EXT_meshopt_compression");
+    if (packed.present()) {
+      read_meshopt_view(packed, document, view);
+    } else if (document.buffers[view.buffer].placeholder) {
+      node.fail_at("buffer", "a buffer with bytes", "a fallback of EXT_meshopt_compression");
     }
   }
 }

@@ -37,6 +37,7 @@ void read_light(const JsonNode& node, Light& light) {
   light.name = node.text("name");
   light.color = node.clamped_numbers<3>("color", {1, 1, 1}, 0, kMaxIntensity);
   light.intensity = node.clamped("intensity", 1, 0, kMaxIntensity);
+  light.range = node.clamped("range", 0, 0, kMaxIntensity);
   const std::string type = node.text("type");
   if (type == "directional") {
     light.type = LightType::kDirectional;

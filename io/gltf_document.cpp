@@ -40,22 +40,6 @@ void check_version(const JsonNode& root) {
   if (!version.starts_with("2.")) asset.fail_at("version", "2.x", version.empty() ? "nothing" : printable(version));
 }
 
-/// What moves is shown as it is stored.
-void warn_about_motion(const JsonNode& root, const Limits& limits, Document& document) {
-  std::string kinds;
-  if (root.array("skins", limits.objects_count).size() > 0) kinds += "skins";
-  bool morphs = false;
-  const JsonNode meshes = root.array("meshes", limits.objects_count);
-  for (uint64_t i = 0; i < meshes.size() && !morphs; ++i) {
-    const JsonNode primitives = meshes[i].member("primitives");
-    for (uint64_t k = 0; k < primitives.size() && !morphs; ++k) morphs = primitives[k].member("targets").size() > 0;
-  }
-  if (morphs) kinds += kinds.empty() ? "morph targets" : ", morph targets";
-  if (root.array("animations", limits.objects_count).size() > 0)
-    kinds += kinds.empty() ? "animations" : ", animations";
-  if (!kinds.empty()) document.warnings.push_back(kinds + ": not posed yet, the rest geometry is used");
-}
-
 }  // namespace
 
 uint32_t component_bytes(ComponentType type) {
@@ -119,7 +103,9 @@ Result<Document> load_document(FileSystem& fs, const std::string& path, const Li
   read_meshes(root, limits, document);
   read_cameras_and_lights(root, limits, document);
   read_nodes(root, limits, document);
-  warn_about_motion(root, limits, document);
+  read_skins_and_animations(root, limits, document);
+  SHOAL_RETURN_IF_ERROR(text.status());
+  SHOAL_RETURN_IF_ERROR(check_texture_sources(document));
   SHOAL_RETURN_IF_ERROR(text.status());
   for (std::string& warning : text.take_warnings()) document.warnings.push_back(std::move(warning));
   return document;

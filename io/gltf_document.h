@@ -8,12 +8,14 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "io/file.h"
 #include "io/result.h"
+#include "io/scratch_file.h"
 
 namespace shoal::gltf {
 
@@ -42,12 +44,34 @@ struct Buffer {
   std::string path;         ///< of an external file; empty: embedded
   uint64_t path_offset = 0; ///< where the bytes begin (a .glb's BIN chunk: the .glb itself)
   std::vector<std::byte> embedded;  ///< decoded data: URI
+  std::shared_ptr<ScratchFile> scratch;  ///< where decompress() put the bytes; null: it did not
+  bool placeholder = false;  ///< EXT_meshopt_compression's fallback: nothing is read from it
 };
 
 struct BufferView {
   uint32_t buffer = 0;
   uint64_t byte_offset = 0, byte_length = 0;
   uint32_t byte_stride = 0;  ///< 0: tightly packed
+  std::optional<uint32_t> meshopt;  ///< of Document::meshopt_views: its bytes are not there before decompress()
+};
+
+/// EXT_meshopt_compression of a buffer view.
+enum class MeshoptMode : uint8_t { kAttributes, kTriangles, kIndices };
+enum class MeshoptFilter : uint8_t { kNone, kOctahedral, kQuaternion, kExponential };
+struct MeshoptView {
+  uint32_t buffer = 0;
+  uint64_t byte_offset = 0, byte_length = 0;  ///< compressed
+  uint64_t count = 0;
+  uint32_t byte_stride = 0;
+  MeshoptMode mode = MeshoptMode::kAttributes;
+  MeshoptFilter filter = MeshoptFilter::kNone;
+};
+
+/// KHR_draco_mesh_compression of a primitive.
+struct DracoPrimitive {
+  uint32_t view = 0;
+  std::map<std::string, uint32_t> attributes;  ///< name -> unique id in the compressed mesh
+  auto operator<=>(const DracoPrimitive&) const = default;
 };
 
 struct SparseAccessor {
@@ -86,17 +110,54 @@ struct VariantMaterial {
   std::vector<uint32_t> variants;  ///< indices into Document::variants
 };
 
+/// Displacements of a primitive's vertices, as accessors.
+struct MorphTarget {
+  std::optional<uint32_t> position, normal, tangent;
+};
+
 struct Primitive {
   std::map<std::string, uint32_t> attributes;  ///< POSITION, NORMAL, TEXCOORD_0, ... -> accessor
   std::optional<uint32_t> indices;
   std::optional<uint32_t> material;
+  std::optional<uint32_t> draco;  ///< of Document::draco_primitives: its accessors are empty before decompress()
   PrimitiveMode mode = PrimitiveMode::kTriangles;
   std::vector<VariantMaterial> variant_materials;
+  std::vector<MorphTarget> targets;
 };
+
+/// Of each joint of a skin: its world matrix times its inverse bind matrix, columns x, y, z and translation.
+using JointMatrices = std::vector<std::array<double, 12>>;
 
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;
+  std::vector<double> weights;  ///< of the morph targets; posed: those of the one node that shows it so
+  std::shared_ptr<const JointMatrices> joints;  ///< put there by engine/pose_document; null: not skinned
+};
+
+struct Skin {
+  std::vector<uint32_t> joints;  ///< nodes
+  std::optional<uint32_t> inverse_bind;
+};
+
+enum class Interpolation : uint8_t { kStep, kLinear, kCubicSpline };
+enum class AnimatedPath : uint8_t { kTranslation, kRotation, kScale, kWeights };
+struct AnimationChannel {
+  uint32_t node = 0, sampler = 0;
+  uint32_t input = 0, output = 0;  ///< accessors of times and values
+  Interpolation interpolation = Interpolation::kLinear;
+  AnimatedPath path = AnimatedPath::kTranslation;
+};
+struct Animation {
+  std::string name;
+  std::vector<AnimationChannel> channels;
+};
+
+/// Where a node is while nothing moves it.
+struct RestPlace {
+  std::array<double, 3> translation{0, 0, 0};
+  std::array<double, 4> rotation{0, 0, 0, 1};
+  std::array<double, 3> scale{1, 1, 1};
 };
 
 struct TextureInfo {
@@ -164,6 +225,7 @@ struct Image {
 
 struct Texture {
   std::optional<uint32_t> sampler, image;
+  bool basisu = false;  ///< KHR_texture_basisu names an image, which is not read
 };
 
 struct Camera {
@@ -180,6 +242,7 @@ struct Light {                               // KHR_lights_punctual
   std::array<double, 3> color{1, 1, 1};
   double intensity = 1;                      ///< candela, directional: lux
   double inner_cone = 0, outer_cone = 0.7853981633974483;
+  double range = 0;                          ///< of points and spots; 0: none
 };
 
 struct Node {
@@ -189,15 +252,23 @@ struct Node {
   std::optional<uint32_t> mesh, camera, light, skin;
 };
 
+/// EXT_mesh_gpu_instancing: accessors of what each instance adds below its node.
+struct Instancing {
+  uint64_t count = 0;
+  std::optional<uint32_t> translation, rotation, scale;
+};
+
 struct Document {
   std::string path;       ///< of the .gltf or .glb
   std::string folder;
   uint64_t content_hash = 0;  ///< XXH3 of the JSON
   std::vector<std::string> extensions_used, extensions_required;
-  std::vector<std::string> warnings;  ///< for the log: unknown extensions used, skins not posed, ...
+  std::vector<std::string> warnings;  ///< for the log: unknown extensions used, ...
   std::vector<uint32_t> roots;        ///< nodes of the default scene (or all parentless nodes)
   std::vector<Buffer> buffers;
   std::vector<BufferView> views;
+  std::vector<MeshoptView> meshopt_views;
+  std::vector<DracoPrimitive> draco_primitives;
   std::vector<Accessor> accessors;
   std::vector<Mesh> meshes;
   std::vector<Material> materials;
@@ -208,7 +279,16 @@ struct Document {
   std::vector<Light> lights;
   std::vector<Node> nodes;
   std::vector<std::string> variants;  ///< KHR_materials_variants: names
+  std::vector<Skin> skins;
+  std::vector<Animation> animations;
+  std::map<uint32_t, RestPlace> rest_places;             ///< of the nodes that an animation moves
+  std::map<uint32_t, std::vector<double>> node_weights;  ///< of morph targets, where the node has its own
+  std::map<uint32_t, Instancing> instancings;  ///< by node; nodes that show a mesh only
 };
+
+/// Translation * rotation * scale, column-major. The quaternion is normalised: exporters round it. Requires: it is not 0.
+std::array<double, 16> compose_matrix(const std::array<double, 3>& translation, const std::array<double, 4>& rotation,
+                                      const std::array<double, 3>& scale);
 
 /// Fails with: kInput (missing, truncated, malformed, over a budget; names file and JSON place such as
 /// "accessors[3].count"), kUnsupported (extensionsRequired that are not read, named with what to do).

@@ -11,7 +11,11 @@ namespace shoal::gltf {
 
 namespace {
 
-constexpr std::array<std::string_view, 16> kRead = {
+constexpr std::array<std::string_view, 21> kRead = {
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -27,6 +31,7 @@ constexpr std::array<std::string_view, 16> kRead = {
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_texture_basisu",  // textures that have nothing else are refused where they are read
     "KHR_texture_transform",
 };
 
@@ -36,11 +41,7 @@ constexpr std::array<std::string_view, 2> kWithoutEffect = {"KHR_xmp", "KHR_xmp_
 struct Advice {
   std::string_view name, text;
 };
-constexpr std::array<Advice, 5> kAdvice = {{
-    {"KHR_draco_mesh_compression", "decompress the scene first, for example with `gltf-transform copy IN OUT`"},
-    {"EXT_meshopt_compression", "decompress the scene first, for example with `gltf-transform copy IN OUT`"},
-    {"KHR_texture_basisu", "convert its textures first, for example with `gltf-transform ktxdecompress IN OUT`"},
-    {"EXT_texture_webp", "convert its textures first, for example with `gltf-transform png IN OUT`"},
+constexpr std::array<Advice, 1> kAdvice = {{
     {"EXT_texture_avif", "convert its textures first, for example with `gltf-transform png IN OUT`"},
 }};
 
@@ -82,6 +83,17 @@ Status check_required_extensions(const Document& document) {
     }
     return Error{ErrorCode::kUnsupported, fmt::format("{}: extensionsRequired: {} is not supported; {}",
                                                       document.path, printable(name), advice)};
+  }
+  return {};
+}
+
+Status check_texture_sources(const Document& document) {
+  for (size_t i = 0; i < document.textures.size(); ++i) {
+    if (!document.textures[i].basisu || document.textures[i].image) continue;
+    return Error{ErrorCode::kUnsupported,
+                 fmt::format("{}: textures[{}]: KHR_texture_basisu is not supported, and the texture has no other source; "
+                             "convert its textures first, for example with `gltf-transform ktxdecompress IN OUT`",
+                             document.path, i)};
   }
   return {};
 }

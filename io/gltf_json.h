@@ -72,6 +72,7 @@ class JsonNode {
   /// Of the value itself.
   uint64_t as_index(uint64_t size) const;
   std::string as_text() const;
+  double as_number() const;
 
   /// Records an error at this node or at one of its members, unless there is one.
   void fail(const std::string& expected, const std::string& found) const;
@@ -90,7 +91,6 @@ class JsonNode {
 
   JsonNode step(const char* name, uint64_t index, const void* value) const;
   std::string place() const;
-  double as_number() const;
   uint64_t as_whole(uint64_t max) const;
   void read_numbers(const char* name, double* values, size_t n) const;
   void clamp_numbers(const char* name, double* values, size_t n, double lo, double hi) const;

@@ -83,6 +83,10 @@ void read_textures(const JsonNode& root, const Limits& limits, Document& documen
     const JsonNode node = textures.object_at(i);
     document.textures[i].sampler = node.index("sampler", document.samplers.size());
     document.textures[i].image = node.index("source", document.images.size());
+    const JsonNode extensions = node.object("extensions");
+    const auto webp = extensions.object("EXT_texture_webp").index("source", document.images.size());
+    if (webp) document.textures[i].image = webp;
+    document.textures[i].basisu = extensions.object("KHR_texture_basisu").present();
   }
 }
 

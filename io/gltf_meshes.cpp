@@ -55,7 +55,78 @@ void check_indices(const JsonNode& node, const Document& document, const Primiti
                            static_cast<int>(accessor.type)));
 }
 
-Primitive read_primitive(const JsonNode& node, const Limits& limits, const Document& document) {
+std::optional<uint32_t> read_target_attribute(const JsonNode& node, const char* name, const Document& document,
+                                              uint64_t vertex_count) {
+  const auto index = node.index(name, document.accessors.size());
+  if (!index || node.failed()) return index;
+  const Accessor& accessor = document.accessors[*index];
+  if (accessor.components != 3 || accessor.matrix || accessor.count < vertex_count) {
+    node.fail_at(name, fmt::format("{} elements of 3 components, as POSITION has", vertex_count),
+                 fmt::format("accessors[{}] of {} elements of {} components", *index, accessor.count,
+                             accessor.components));
+  }
+  return index;
+}
+
+void read_targets(const JsonNode& node, const Document& document, Primitive& primitive) {
+  const JsonNode targets = node.array("targets", kMaxTargets);
+  const auto position = primitive.attributes.find("POSITION");
+  const uint64_t vertices =
+      position == primitive.attributes.end() ? 0 : document.accessors[position->second].count;
+  for (uint64_t t = 0; t < targets.size() && !node.failed(); ++t) {
+    const JsonNode target = targets.object_at(t);
+    primitive.targets.push_back({read_target_attribute(target, "POSITION", document, vertices),
+                                 read_target_attribute(target, "NORMAL", document, vertices),
+                                 read_target_attribute(target, "TANGENT", document, vertices)});
+  }
+}
+
+/// All primitives of a mesh have as many targets, and so many weights where there are any (glTF 2.0, section 3.7.2.2).
+void check_targets(const JsonNode& node, const Mesh& mesh) {
+  if (mesh.primitives.empty() || node.failed()) return;
+  const size_t count = mesh.primitives.front().targets.size();
+  for (const Primitive& primitive : mesh.primitives) {
+    if (primitive.targets.size() == count) continue;
+    return node.fail_at("primitives", fmt::format("{} morph targets each", count),
+                        fmt::format("{}", primitive.targets.size()));
+  }
+  if (mesh.weights.empty() || mesh.weights.size() == count) return;
+  node.fail_at("weights", fmt::format("{}, one a morph target", count), fmt::format("{}", mesh.weights.size()));
+}
+
+/// Where the accessors have bytes of their own as well, those are read: they need not be held whole.
+bool needs_draco(const Document& document, const Primitive& primitive, const DracoPrimitive& draco) {
+  if (primitive.indices && !document.accessors[*primitive.indices].view) return true;
+  for (const auto& [name, id] : draco.attributes) {
+    const Accessor& accessor = document.accessors[primitive.attributes.at(name)];
+    if (!accessor.view && !accessor.sparse) return true;
+  }
+  return false;
+}
+
+void read_draco(const JsonNode& primitive_node, Document& document, Primitive& primitive) {
+  const JsonNode node = primitive_node.object("extensions").object("KHR_draco_mesh_compression");
+  if (!node.present() || primitive_node.failed()) return;
+  DracoPrimitive draco;
+  draco.view = node.required_index("bufferView", document.views.size());
+  const JsonNode attributes = node.object("attributes");
+  attributes.each_member([&](const char* name, const JsonNode&) {
+    draco.attributes[name] = static_cast<uint32_t>(attributes.required_whole(name, 0xffffffffu));
+    if (primitive.attributes.contains(name)) return;
+    attributes.fail_at(name, "an attribute that the primitive has as well", "none");
+  });
+  if (node.failed() || !needs_draco(document, primitive, draco)) return;
+  if (document.views[draco.view].meshopt) node.fail_at("bufferView", "a view that is not compressed again", "one that is");
+  if (!primitive.indices) primitive_node.fail_at("indices", "an accessor, as every Draco mesh has", "nothing");
+  if (!draco.attributes.contains("POSITION")) node.fail_at("attributes", "POSITION", "none");
+  if (primitive.mode != PrimitiveMode::kTriangles) {
+    primitive_node.fail_at("mode", "4 (triangles) of a Draco mesh", fmt::format("{}", static_cast<int>(primitive.mode)));
+  }
+  primitive.draco = static_cast<uint32_t>(document.draco_primitives.size());
+  document.draco_primitives.push_back(std::move(draco));
+}
+
+Primitive read_primitive(const JsonNode& node, const Limits& limits, Document& document) {
   Primitive primitive;
   read_attributes(node, document, primitive);
   primitive.indices = node.index("indices", document.accessors.size());
@@ -65,10 +136,19 @@ Primitive read_primitive(const JsonNode& node, const Limits& limits, const Docum
   constexpr auto kLast = static_cast<uint64_t>(PrimitiveMode::kTriangleFan);
   primitive.mode =
       static_cast<PrimitiveMode>(node.whole("mode", static_cast<uint64_t>(PrimitiveMode::kTriangles), kLast));
+  read_targets(node, document, primitive);
+  read_draco(node, document, primitive);
   return primitive;
 }
 
 }  // namespace
+
+std::vector<double> read_weights(const JsonNode& node) {
+  std::vector<double> weights;
+  const JsonNode array = node.array("weights", kMaxTargets);
+  for (uint64_t i = 0; i < array.size() && !node.failed(); ++i) weights.push_back(array[i].as_number());
+  return weights;
+}
 
 void read_meshes(const JsonNode& root, const Limits& limits, Document& document) {
   const JsonNode array = root.array("meshes", limits.objects_count);
@@ -82,6 +162,8 @@ void read_meshes(const JsonNode& root, const Limits& limits, Document& document)
     for (uint64_t k = 0; k < primitives.size() && !root.failed(); ++k) {
       mesh.primitives.push_back(read_primitive(primitives.object_at(k), limits, document));
     }
+    mesh.weights = read_weights(node);
+    check_targets(node, mesh);
   }
 }
 

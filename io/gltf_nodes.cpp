@@ -9,29 +9,6 @@ namespace shoal::gltf {
 
 namespace {
 
-/// Translation * rotation * scale, column-major, in double. The quaternion is normalised: exporters round it.
-std::array<double, 16> compose(const std::array<double, 3>& t, const std::array<double, 4>& q,
-                               const std::array<double, 3>& s) {
-  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-  return {s[0] * (1 - 2 * (y * y + z * z)),
-          s[0] * 2 * (x * y + w * z),
-          s[0] * 2 * (x * z - w * y),
-          0,
-          s[1] * 2 * (x * y - w * z),
-          s[1] * (1 - 2 * (x * x + z * z)),
-          s[1] * 2 * (y * z + w * x),
-          0,
-          s[2] * 2 * (x * z + w * y),
-          s[2] * 2 * (y * z - w * x),
-          s[2] * (1 - 2 * (x * x + y * y)),
-          0,
-          t[0],
-          t[1],
-          t[2],
-          1};
-}
-
 std::array<double, 16> read_matrix(const JsonNode& node) {
   if (node.member("matrix").present()) {
     const auto matrix = node.numbers<16>("matrix", {});
@@ -43,7 +20,7 @@ std::array<double, 16> read_matrix(const JsonNode& node) {
   }
   const auto rotation = node.numbers<4>("rotation", {0, 0, 0, 1});
   if (rotation == std::array<double, 4>{}) node.fail_at("rotation", "a unit quaternion", "0 0 0 0");
-  return compose(node.numbers<3>("translation", {0, 0, 0}), rotation, node.numbers<3>("scale", {1, 1, 1}));
+  return compose_matrix(node.numbers<3>("translation", {0, 0, 0}), rotation, node.numbers<3>("scale", {1, 1, 1}));
 }
 
 std::vector<uint32_t> read_node_list(const JsonNode& parent, const char* name, const Limits& limits,
@@ -65,6 +42,41 @@ void read_node(const JsonNode& node, uint64_t skins_count, const Limits& limits,
   out.camera = node.index("camera", document.cameras.size());
   out.skin = node.index("skin", skins_count);
   out.light = node.object("extensions").object("KHR_lights_punctual").index("light", document.lights.size());
+}
+
+std::optional<uint32_t> read_instance_accessor(const JsonNode& attributes, const char* name, uint32_t components,
+                                               const Document& document, std::optional<uint64_t>& count) {
+  const auto index = attributes.index(name, document.accessors.size());
+  if (!index || attributes.failed()) return index;
+  const Accessor& accessor = document.accessors[*index];
+  if (accessor.components != components || accessor.matrix) {
+    attributes.fail_at(name, fmt::format("an accessor of {} components", components),
+                       fmt::format("accessors[{}] of {}", *index, accessor.components));
+  } else if (count && *count != accessor.count) {
+    attributes.fail_at(name, fmt::format("{} elements, as the other attributes have", *count),
+                       fmt::format("{}", accessor.count));
+  }
+  count = accessor.count;
+  return index;
+}
+
+void read_node_weights(const JsonNode& node, uint32_t index, Document& document) {
+  if (!document.nodes[index].mesh || !node.member("weights").present()) return;
+  std::vector<double> weights = read_weights(node);
+  if (!weights.empty()) document.node_weights.emplace(index, std::move(weights));
+}
+
+void read_instancing(const JsonNode& node, uint32_t index, Document& document) {
+  const JsonNode attributes = node.object("extensions").object("EXT_mesh_gpu_instancing").object("attributes");
+  if (!attributes.present() || !document.nodes[index].mesh) return;
+  Instancing out;
+  std::optional<uint64_t> count;
+  out.translation = read_instance_accessor(attributes, "TRANSLATION", 3, document, count);
+  out.rotation = read_instance_accessor(attributes, "ROTATION", 4, document, count);
+  out.scale = read_instance_accessor(attributes, "SCALE", 3, document, count);
+  if (node.failed() || !count) return;  // attributes of applications alone place nothing
+  out.count = *count;
+  document.instancings.emplace(index, out);
 }
 
 constexpr uint32_t kNoParent = 0xffffffffu;
@@ -135,12 +147,37 @@ void read_roots(const JsonNode& root, const std::vector<uint32_t>& parents, cons
 
 }  // namespace
 
+std::array<double, 16> compose_matrix(const std::array<double, 3>& t, const std::array<double, 4>& q,
+                                      const std::array<double, 3>& s) {
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
+  return {s[0] * (1 - 2 * (y * y + z * z)),
+          s[0] * 2 * (x * y + w * z),
+          s[0] * 2 * (x * z - w * y),
+          0,
+          s[1] * 2 * (x * y - w * z),
+          s[1] * (1 - 2 * (x * x + z * z)),
+          s[1] * 2 * (y * z + w * x),
+          0,
+          s[2] * 2 * (x * z + w * y),
+          s[2] * 2 * (y * z - w * x),
+          s[2] * (1 - 2 * (x * x + y * y)),
+          0,
+          t[0],
+          t[1],
+          t[2],
+          1};
+}
+
 void read_nodes(const JsonNode& root, const Limits& limits, Document& document) {
   const uint64_t skins_count = root.array("skins", limits.objects_count).size();
   const JsonNode array = root.array("nodes", limits.objects_count);
   document.nodes.resize(array.size());
   for (uint64_t i = 0; i < array.size() && !root.failed(); ++i) {
-    read_node(array.object_at(i), skins_count, limits, document, document.nodes[i]);
+    const JsonNode node = array.object_at(i);
+    read_node(node, skins_count, limits, document, document.nodes[i]);
+    read_node_weights(node, static_cast<uint32_t>(i), document);
+    read_instancing(node, static_cast<uint32_t>(i), document);
   }
   if (root.failed()) return;
   const auto parents = find_parents(array, document);

@@ -15,6 +15,8 @@ namespace shoal::gltf {
 void read_extensions(const JsonNode& root, const Limits& limits, Document& document);
 /// Fails with: kUnsupported.
 Status check_required_extensions(const Document& document);
+/// Fails with: kUnsupported (a texture whose only image is one of KHR_texture_basisu).
+Status check_texture_sources(const Document& document);
 
 /// `binary` is the BIN chunk of a .glb.
 void read_buffers(const JsonNode& root, const std::optional<FileRange>& binary, const Limits& limits,
@@ -32,9 +34,14 @@ void read_variants(const JsonNode& root, const Limits& limits, Document& documen
 void read_variant_materials(const JsonNode& node, const Limits& limits, const Document& document,
                             Primitive& primitive);
 void read_meshes(const JsonNode& root, const Limits& limits, Document& document);
+/// Morph targets of a mesh: far above what is modelled, and what a file's own bytes can say of them stays small.
+inline constexpr uint64_t kMaxTargets = 65536;
+/// Weights of morph targets, of a mesh or a node. Fails the text when one is not a number.
+std::vector<double> read_weights(const JsonNode& node);
 void read_cameras_and_lights(const JsonNode& root, const Limits& limits, Document& document);
 /// Nodes and the roots of the default scene; checks that they are a forest.
 void read_nodes(const JsonNode& root, const Limits& limits, Document& document);
+void read_skins_and_animations(const JsonNode& root, const Limits& limits, Document& document);
 
 /// Bytes of one element, with the padding of matrix columns to 4 bytes (glTF 2.0, section 3.6.2.4).
 uint64_t element_bytes(const Accessor& accessor);

@@ -8,6 +8,7 @@
 #include "io/jpeg_image.h"
 #include "io/png_image.h"
 #include "io/radiance_image.h"
+#include "io/webp_image.h"
 
 namespace shoal {
 
@@ -24,7 +25,8 @@ constexpr uint64_t kExrBlockLines = 32, kExrBlockCopies = 4;
 Result<Image8> decode_image(std::span<const std::byte> bytes, const std::string& name, uint64_t max_pixels) {
   if (is_png(bytes)) return decode_png(bytes, name, max_pixels);
   if (is_jpeg(bytes)) return decode_jpeg(bytes, name, max_pixels);
-  return Error{ErrorCode::kInput, fmt::format("{}: expected a PNG or a JPEG, found another format", name)};
+  if (is_webp(bytes)) return decode_webp(bytes, name, max_pixels);
+  return Error{ErrorCode::kInput, fmt::format("{}: expected a PNG, a JPEG or a WebP, found another format", name)};
 }
 
 Result<ImageF> read_hdr_image(FileSystem& fs, const std::string& path, uint64_t max_pixels) {

@@ -1,4 +1,4 @@
-// Pictures in and out. Every decoder bounds sizes before it calls its library; libpng, libjpeg-turbo
+// Pictures in and out. Every decoder bounds sizes before it calls its library; libpng, libjpeg-turbo, libwebp
 // and OpenEXR stay inside the one .cpp that adapts them. Thread rule: plain functions.
 #pragma once
 
@@ -22,7 +22,7 @@ struct Image8 {
   std::vector<uint8_t> rgba;
 };
 
-/// PNG or JPEG by its first bytes. `name` is for messages. Fails with: kInput.
+/// PNG, JPEG or WebP by its first bytes. `name` is for messages. Fails with: kInput.
 Result<Image8> decode_image(std::span<const std::byte> bytes, const std::string& name, uint64_t max_pixels);
 
 /// Linear float RGB, rows from the top.

@@ -21,8 +21,7 @@ uint64_t triangle_count(PrimitiveMode mode, uint64_t corner_count) {
 
 }  // namespace
 
-Result<TriangleStream> TriangleStream::open(BufferFiles& files, const Document& document,
-                                            const Primitive& primitive) {
+Result<TriangleStream> TriangleStream::describe(const Document& document, const Primitive& primitive) {
   TriangleStream stream;
   const auto position = primitive.attributes.find("POSITION");
   const bool has_triangles = primitive.mode == PrimitiveMode::kTriangles ||
@@ -40,12 +39,21 @@ Result<TriangleStream> TriangleStream::open(BufferFiles& files, const Document& 
   }
   uint64_t corner_count = stream.vertex_count_;
   if (primitive.indices) {
-    SHOAL_ASSIGN_OR_RETURN(stream.indices_, AccessorReader::open(files, document, *primitive.indices));
-    corner_count = stream.indices_->count();
-    const uint32_t bytes = component_bytes(document.accessors[*primitive.indices].type);
-    stream.restart_ = std::numeric_limits<uint32_t>::max() >> (32 - 8 * bytes);
+    const Accessor& indices = document.accessors[*primitive.indices];
+    corner_count = indices.count;
+    stream.restart_ = std::numeric_limits<uint32_t>::max() >> (32 - 8 * component_bytes(indices.type));
   }
   stream.count_ = triangle_count(stream.mode_, corner_count);
+  return stream;
+}
+
+Result<TriangleStream> TriangleStream::open(BufferFiles& files, const Document& document,
+                                            const Primitive& primitive) {
+  SHOAL_ASSIGN_OR_RETURN(TriangleStream stream, describe(document, primitive));
+  const bool draws = stream.vertex_count_ > 0 || stream.count_ > 0;
+  if (draws && primitive.indices) {
+    SHOAL_ASSIGN_OR_RETURN(stream.indices_, AccessorReader::open(files, document, *primitive.indices));
+  }
   return stream;
 }
 

@@ -21,11 +21,13 @@ void expect_usage(const ProgramRun& run, const std::vector<std::string>& parts) 
 TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
   const TemporaryFolder folder;
   const std::map<std::string, std::vector<std::string>> expected = {
-      {"build", {"--output", "--treelet-size", "--max-memory", "--threads"}},
+      {"build", {"--output", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
-                  "--tonemap", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted"}},
+                  "--tonemap", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted",
+                  "--projection", "perspective, orthographic, equirectangular, fisheye", "--fov", "--ortho-height",
+                  "--aperture", "--focus", "--distortion", "--time", "--animation"}},
       {"compare", {"--orders", "--out", "--runs", "--width", "--spp", "--max-memory"}},
       {"info", {"--json"}},
       {"verify", {"file"}},

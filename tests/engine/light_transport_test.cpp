@@ -127,6 +127,21 @@ TEST(LightTransport, APointLightFollowsTheInverseSquare) {
   }
 }
 
+TEST(LightTransport, ALightWithARangeFadesTowardsItsEnd) {
+  ShadingScene s = floor_scene(1, 1, 1, false);
+  const auto brightness = [&](PunctualType type, float height, float range) {
+    s.scene.lights = {{type, {0, height, 0}, {0, -1, 0}, {1, 1, 1}, 1, 0, range}};
+    s.prepare(with_bounces(1));
+    return s.radiance(kEye, kDown, 0, 0).x / (kAlbedo.x / kPi) * height * height;
+  };
+  for (const PunctualType type : {PunctualType::kPoint, PunctualType::kSpot}) {
+    EXPECT_NEAR(brightness(type, 2, 0), 1, 1e-4f);  // none
+    EXPECT_NEAR(brightness(type, 2, 4), 1 - 1.0f / 16, 1e-4f);
+    EXPECT_NEAR(brightness(type, 3, 4), 1 - 81.0f / 256, 1e-4f);
+    EXPECT_EQ(brightness(type, 4.01f, 4), 0);
+  }
+}
+
 TEST(LightTransport, ADirectionalLightGivesItsLux) {
   ShadingScene s = floor_scene(1, 1, 1, false);
   const Vec3 d = glm::normalize(Vec3(1, -2, 0.5f));

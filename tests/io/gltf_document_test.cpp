@@ -145,22 +145,108 @@ TEST(GltfDocument, WarnsOnceOfEachExtensionThatIsUsedButNotRead) {
 
 TEST(GltfDocument, RefusesARequiredExtensionWithAdvice) {
   GltfScene scene = triangle_scene();
-  scene.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+  scene.root["extensionsRequired"] = {"EXT_texture_avif"};
   MemoryFileSystem fs;
   const auto document = load_document(fs, scene.put(fs));
   ASSERT_FALSE(document.ok());
   EXPECT_EQ(document.error().code, ErrorCode::kUnsupported);
-  EXPECT_THAT(document.error().message, HasSubstr("KHR_draco_mesh_compression"));
-  EXPECT_THAT(document.error().message, HasSubstr("gltf-transform copy"));
+  EXPECT_THAT(document.error().message, HasSubstr("EXT_texture_avif"));
+  EXPECT_THAT(document.error().message, HasSubstr("gltf-transform png"));
 }
 
-TEST(GltfDocument, WarnsThatSkinsMorphTargetsAndAnimationsAreNotPosed) {
+TEST(GltfDocument, ATextureIsItsWebpWhereItHasOneAndNeverABasisuImage) {
   GltfScene scene = triangle_scene();
-  scene.root["skins"] = {{{"joints", {0}}}};
-  scene.root["animations"] = {json::object()};
-  scene.root["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}};
-  EXPECT_THAT(load(scene).warnings,
-              ElementsAre("skins, morph targets, animations: not posed yet, the rest geometry is used"));
+  scene.root["images"].push_back({{"uri", "b.webp"}});
+  json& texture = scene.root["textures"][0];
+  texture["extensions"]["EXT_texture_webp"]["source"] = 1;
+  scene.root["extensionsRequired"] = {"EXT_texture_webp"};
+  EXPECT_EQ(load(scene).textures[0].image, 1u);
+  texture.erase("source");
+  EXPECT_EQ(load(scene).textures[0].image, 1u);
+  texture["extensions"] = {{"KHR_texture_basisu", {{"source", 1}}}};
+  texture["source"] = 0;
+  scene.root["extensionsRequired"] = {"KHR_texture_basisu"};
+  EXPECT_EQ(load(scene).textures[0].image, 0u);
+  texture.erase("source");
+  MemoryFileSystem fs;
+  const auto document = load_document(fs, scene.put(fs));
+  ASSERT_FALSE(document.ok());
+  EXPECT_EQ(document.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(document.error().message, HasSubstr("textures[0]: KHR_texture_basisu is not supported"));
+  EXPECT_THAT(document.error().message, HasSubstr("gltf-transform ktxdecompress"));
+}
+
+TEST(GltfDocument, InstancesHaveAttributesOfOneLengthAndTheRightShape) {
+  GltfScene scene = triangle_scene();
+  scene.add_accessor<float>({1, 2, 3, 4, 5, 6}, "VEC3", kFloat, 2);
+  scene.add_accessor<float>({0, 0, 0, 1}, "VEC4", kFloat, 1);
+  json& attributes = scene.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+  attributes = {{"TRANSLATION", 3}, {"_ID", 4}};
+  const Document document = load(scene);
+  ASSERT_EQ(document.instancings.size(), 1u);
+  EXPECT_EQ(document.instancings.at(0).count, 2u);
+  attributes = {{"_ID", 4}};
+  EXPECT_TRUE(load(scene).instancings.empty());
+  attributes = {{"TRANSLATION", 3}, {"ROTATION", 4}};
+  EXPECT_THAT(load_error(scene), HasSubstr("nodes[0].extensions.EXT_mesh_gpu_instancing.attributes.ROTATION: expected"));
+  attributes = {{"SCALE", 4}};
+  EXPECT_THAT(load_error(scene), HasSubstr("expected an accessor of 3 components"));
+}
+
+TEST(GltfDocument, ReadsSkinsMorphTargetsAndAnimations) {
+  GltfScene scene = triangle_scene();
+  const uint32_t times = scene.add_accessor<float>({0, 1}, "SCALAR", kFloat, 2);
+  const uint32_t moves = scene.add_accessor<float>({0, 0, 0, 1, 1, 1}, "VEC3", kFloat, 2);
+  scene.root["skins"] = {{{"joints", {1, 0}}}};
+  scene.root["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}, {{"NORMAL", 1}}};
+  scene.root["meshes"][0]["weights"] = {0.25, 0.5};
+  scene.root["nodes"][0]["weights"] = {1, 2};
+  scene.root["nodes"][0]["skin"] = 0;
+  scene.root["animations"] = {{{"name", "turn"},
+                               {"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}},
+                                             {{"sampler", 0}, {"target", {{"path", "rotation"}}}}}},
+                               {"samplers", {{{"input", times}, {"output", moves}, {"interpolation", "STEP"}}}}}};
+  const Document document = load(scene);
+  EXPECT_THAT(document.skins.at(0).joints, ElementsAre(1, 0));
+  EXPECT_EQ(document.nodes[0].skin, 0u);
+  EXPECT_THAT(document.meshes[0].weights, ElementsAre(0.25, 0.5));
+  EXPECT_EQ(document.meshes[0].primitives[0].targets.at(1).normal, 1u);
+  EXPECT_THAT(document.node_weights.at(0), ElementsAre(1, 2));
+  ASSERT_EQ(document.animations.at(0).channels.size(), 1u);
+  EXPECT_EQ(document.animations[0].name, "turn");
+  EXPECT_EQ(document.animations[0].channels[0].interpolation, Interpolation::kStep);
+  EXPECT_THAT(document.rest_places.at(1).translation, ElementsAre(1, 2, 3));
+  EXPECT_TRUE(document.warnings.empty());
+}
+
+TEST(GltfDocument, RefusesMotionOfTheWrongShape) {
+  const auto broken = [](const std::string& pointer, const json& value) {
+    GltfScene scene = triangle_scene();
+    scene.add_accessor<float>({0, 1}, "SCALAR", kFloat, 2);
+    scene.add_accessor<float>({0, 0, 0, 1, 1, 1}, "VEC3", kFloat, 2);
+    scene.root["skins"] = {{{"joints", {1, 0}}}};
+    scene.root["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}};
+    scene.root["meshes"][0]["weights"] = {0.25};
+    scene.root["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}}}},
+                                 {"samplers", {{{"input", 3}, {"output", 4}}}}}};
+    EXPECT_EQ(load_error(scene), "");
+    scene.root[json::json_pointer(pointer)] = value;
+    return load_error(scene);
+  };
+  EXPECT_THAT(broken("/skins/0/joints", json::array()), HasSubstr("skins[0].joints: expected one node at least"));
+  EXPECT_THAT(broken("/skins/0/joints/0", 9), HasSubstr("skins[0].joints[0]"));
+  EXPECT_THAT(broken("/skins/0/inverseBindMatrices", 0), HasSubstr("2 matrices of 4 x 4 floats"));
+  EXPECT_THAT(broken("/meshes/0/weights", {1, 2}), HasSubstr("meshes[0].weights: expected 1, one a morph target"));
+  EXPECT_THAT(broken("/meshes/0/weights/0", "x"), HasSubstr("meshes[0].weights[0]"));
+  EXPECT_THAT(broken("/meshes/0/primitives/0/targets/0/POSITION", 3), HasSubstr("targets[0].POSITION: expected 3"));
+  const std::string animation = "/animations/0/";
+  EXPECT_THAT(broken(animation + "channels/0/sampler", 1), HasSubstr("animations[0].channels[0].sampler"));
+  EXPECT_THAT(broken(animation + "channels/0/target/node", 7), HasSubstr("target.node"));
+  EXPECT_THAT(broken(animation + "channels/0/target/path", "rotation"), HasSubstr("values of 4 components"));
+  EXPECT_THAT(broken(animation + "samplers/0/input", 4), HasSubstr("samplers[0].input: expected times"));
+  EXPECT_THAT(broken(animation + "samplers/0/interpolation", "CUBICSPLINE"), HasSubstr("expected 6 values, found 2"));
+  EXPECT_THAT(broken(animation + "samplers/0/interpolation", "CUBIC"), HasSubstr("STEP, LINEAR or CUBICSPLINE"));
+  EXPECT_THAT(broken("/nodes/1/matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), HasSubstr("animated node"));
 }
 
 TEST(GltfDocument, GivesTheSameHashToTheSameJsonOnly) {

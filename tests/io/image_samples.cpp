@@ -1,5 +1,7 @@
 #include "tests/io/image_samples.h"
 
+#include <webp/encode.h>
+
 #include <png.h>
 
 #include <cstdio>
@@ -71,6 +73,17 @@ std::vector<std::byte> make_jpeg(uint32_t width, uint32_t height, int components
   const auto* begin = reinterpret_cast<std::byte*>(memory);
   std::vector<std::byte> out(begin, begin + size);
   std::free(memory);
+  return out;
+}
+
+std::vector<std::byte> make_webp(uint32_t width, uint32_t height, bool lossless, const std::vector<uint8_t>& rgba) {
+  const int w = static_cast<int>(width), h = static_cast<int>(height);
+  uint8_t* bytes = nullptr;
+  const size_t size = lossless ? WebPEncodeLosslessRGBA(rgba.data(), w, h, 4 * w, &bytes)
+                               : WebPEncodeRGBA(rgba.data(), w, h, 4 * w, 90, &bytes);
+  std::vector<std::byte> out(size);
+  for (size_t i = 0; i < size; ++i) out[i] = static_cast<std::byte>(bytes[i]);
+  WebPFree(bytes);
   return out;
 }
 

@@ -17,4 +17,7 @@ std::vector<std::byte> make_png(uint32_t width, uint32_t height, int color_type,
 std::vector<std::byte> make_jpeg(uint32_t width, uint32_t height, int components, bool progressive,
                                  const std::vector<uint8_t>& pixels);
 
+/// RGBA, without loss or with it.
+std::vector<std::byte> make_webp(uint32_t width, uint32_t height, bool lossless, const std::vector<uint8_t>& rgba);
+
 }  // namespace shoal

@@ -117,10 +117,34 @@ TEST(DecodeImage, RefusesCmykJpegsOtherFormatsAndTooManyPixels) {
   EXPECT_EQ(jpeg.error().message, "a.jpg: expected at most 15 pixels, found 4 x 4");
 }
 
+TEST(DecodeImage, ReadsWebpWithAlphaAndWithout) {
+  std::vector<uint8_t> rgba;
+  for (uint32_t i = 0; i < 32 * 32; ++i) {
+    for (const uint32_t v : {i % 32 * 8, i / 32 * 8, 90u, 255u}) rgba.push_back(static_cast<uint8_t>(v));
+  }
+  const auto opaque = decode_image(make_webp(32, 32, true, rgba), "a.webp", kPixels);
+  ASSERT_TRUE(opaque.ok()) << opaque.error().message;
+  EXPECT_EQ(opaque.value().rgba, rgba);
+  EXPECT_FALSE(opaque.value().has_alpha);
+  const auto lossy = decode_image(make_webp(32, 32, false, rgba), "a.webp", kPixels);
+  ASSERT_TRUE(lossy.ok()) << lossy.error().message;
+  for (size_t i = 0; i < rgba.size(); ++i) ASSERT_NEAR(lossy.value().rgba[i], rgba[i], 24) << i;
+  for (size_t i = 3; i < rgba.size(); i += 4) rgba[i] = static_cast<uint8_t>(i);
+  const auto clear = decode_image(make_webp(32, 32, true, rgba), "a.webp", kPixels);
+  ASSERT_TRUE(clear.ok());
+  EXPECT_TRUE(clear.value().has_alpha);
+  for (size_t i = 3; i < rgba.size(); i += 4) ASSERT_EQ(clear.value().rgba[i], rgba[i]);
+  const auto large = decode_image(make_webp(32, 32, true, rgba), "a.webp", 1023);
+  ASSERT_FALSE(large.ok());
+  EXPECT_EQ(large.error().message, "a.webp: expected at most 1023 pixels, found 32 x 32");
+}
+
 TEST(DecodeImage, RefusesPicturesCutOffAnywhere) {
   const std::vector<std::byte> pictures[] = {make_png(9, 9, PNG_COLOR_TYPE_RGB, 8, true, pattern(243)),
                                              make_jpeg(24, 24, 3, false, pattern(1728)),
-                                             make_jpeg(24, 24, 3, true, pattern(1728))};
+                                             make_jpeg(24, 24, 3, true, pattern(1728)),
+                                             make_webp(24, 24, true, pattern(2304)),
+                                             make_webp(24, 24, false, pattern(2304))};
   for (const auto& bytes : pictures) {
     for (size_t size = 0; size + 2 < bytes.size(); ++size) {
       const auto image = decode_image(std::span(bytes).first(size), "cut", kPixels);

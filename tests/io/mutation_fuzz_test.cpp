@@ -80,6 +80,15 @@ gltf::GltfScene rich_scene() {
   scene.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 1}}}, {"mode", 5}});
   scene.root["images"].push_back({{"uri", "data:image/png;base64,iVBORw0KGgo="}});
   scene.root["nodes"][0]["children"] = nlohmann::json::array();
+  const uint32_t times = scene.add_accessor<float>({0, 1}, "SCALAR", gltf::kFloat, 2);
+  const uint32_t moves = scene.add_accessor<float>({0, 0, 0, 1, 1, 1}, "VEC3", gltf::kFloat, 2);
+  scene.root["skins"] = {{{"joints", {1, 0}}}};
+  scene.root["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}};
+  scene.root["meshes"][0]["primitives"][1]["targets"] = {{{"POSITION", 1}}};
+  scene.root["meshes"][0]["weights"] = {0.5};
+  scene.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", moves}};
+  scene.root["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}}}},
+                               {"samplers", {{{"input", times}, {"output", moves}}}}}};
   return scene;
 }
 

@@ -1,0 +1,274 @@
+#include "engine/pose_document.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "engine/affine_double.h"
+#include "engine/animation_sample.h"
+#include "engine/flatten_nodes.h"
+#include "engine/scene.h"
+
+namespace shoal {
+
+namespace {
+
+using gltf::AnimatedPath;
+
+/// The index that a text of digits is.
+std::optional<uint32_t> index_of(const std::string& text) {
+  uint32_t index = 0;
+  const auto [rest, code] = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (code != std::errc() || rest != text.data() + text.size()) return std::nullopt;
+  return index;
+}
+
+class Poser {
+ public:
+  Poser(gltf::BufferFiles& files, gltf::Document& document, std::vector<std::string>& warnings)
+      : files_(files), document_(document), warnings_(warnings) {}
+
+  Status animate(const ChosenPose& pose) {
+    AnimationSampler sampler(files_, document_, pose.animation, pose.time);
+    std::map<uint32_t, gltf::RestPlace> places;
+    for (const gltf::AnimationChannel& channel : document_.animations[pose.animation].channels) {
+      SHOAL_ASSIGN_OR_RETURN(const std::vector<double> v, sampler.sample(channel));
+      if (channel.path == AnimatedPath::kWeights) {
+        document_.node_weights[channel.node] = v;
+        continue;
+      }
+      gltf::RestPlace& place = places.try_emplace(channel.node, document_.rest_places.at(channel.node)).first->second;
+      if (channel.path == AnimatedPath::kTranslation) place.translation = {v[0], v[1], v[2]};
+      if (channel.path == AnimatedPath::kRotation) place.rotation = {v[0], v[1], v[2], v[3]};
+      if (channel.path == AnimatedPath::kScale) place.scale = {v[0], v[1], v[2]};
+    }
+    for (const auto& [node, place] : places) {
+      document_.nodes[node].matrix = gltf::compose_matrix(place.translation, place.rotation, place.scale);
+    }
+    return {};
+  }
+
+  /// Gives every mesh that is shown its weights and joints.
+  Status pose_meshes() {
+    SHOAL_RETURN_IF_ERROR(pose_skins());
+    std::vector<uint32_t> stack(document_.roots.rbegin(), document_.roots.rend());  // in scene order
+    while (!stack.empty()) {
+      const uint32_t node = stack.back();
+      stack.pop_back();
+      stack.insert(stack.end(), document_.nodes[node].children.rbegin(), document_.nodes[node].children.rend());
+      if (document_.nodes[node].mesh) SHOAL_RETURN_IF_ERROR(pose_mesh(node));
+    }
+    return {};
+  }
+
+ private:
+  /// World matrices of all joints, by one walk over all nodes.
+  void find_joints() {
+    for (const gltf::Skin& skin : document_.skins) {
+      for (const uint32_t joint : skin.joints) worlds_.try_emplace(joint);
+    }
+    std::vector<bool> has_parent(document_.nodes.size());
+    for (const gltf::Node& node : document_.nodes) {
+      for (const uint32_t child : node.children) has_parent[child] = true;
+    }
+    std::vector<std::pair<uint32_t, AffineDouble>> stack;
+    for (uint32_t i = 0; i < document_.nodes.size(); ++i) {
+      if (!has_parent[i]) stack.emplace_back(i, AffineDouble{});
+    }
+    while (!stack.empty()) {
+      const auto [node, parent] = stack.back();
+      stack.pop_back();
+      const AffineDouble world = multiply(parent, affine_of(document_.nodes[node].matrix));
+      if (const auto joint = worlds_.find(node); joint != worlds_.end()) joint->second = world;
+      for (const uint32_t child : document_.nodes[node].children) stack.emplace_back(child, world);
+    }
+  }
+
+  Status pose_skins() {
+    if (document_.skins.empty()) return {};
+    find_joints();
+    for (uint32_t s = 0; s < document_.skins.size(); ++s) {
+      SHOAL_ASSIGN_OR_RETURN(auto matrices, joint_matrices(s));
+      skins_.push_back(std::move(matrices));
+    }
+    return {};
+  }
+
+  Result<std::shared_ptr<const gltf::JointMatrices>> joint_matrices(uint32_t s) {
+    const gltf::Skin& skin = document_.skins[s];
+    auto matrices = std::make_shared<gltf::JointMatrices>();
+    matrices->reserve(skin.joints.size());
+    std::optional<gltf::AccessorReader> reader;
+    if (skin.inverse_bind) {
+      SHOAL_ASSIGN_OR_RETURN(reader, gltf::AccessorReader::open(files_, document_, *skin.inverse_bind));
+    }
+    for (size_t j = 0; j < skin.joints.size(); ++j) {
+      AffineDouble map = worlds_.at(skin.joints[j]);
+      if (reader) {
+        std::array<float, 16> bind;
+        SHOAL_RETURN_IF_ERROR(reader->read_floats(j, 1, bind));
+        std::array<double, 16> wide;
+        std::copy(bind.begin(), bind.end(), wide.begin());
+        map = multiply(map, affine_of(wide));
+      }
+      if (!finite(map)) {
+        return Error{ErrorCode::kInput,
+                     fmt::format("{}: skins[{}]: joint {} (nodes[{}]): expected a finite matrix, found one that is not",
+                                 document_.path, s, j, skin.joints[j])};
+      }
+      std::array<double, 12> out;
+      for (size_t c = 0; c < 3; ++c) std::copy(map.column[c].begin(), map.column[c].end(), &out[3 * c]);
+      std::copy(map.translation.begin(), map.translation.end(), &out[9]);
+      matrices->push_back(out);
+    }
+    return std::shared_ptr<const gltf::JointMatrices>(std::move(matrices));
+  }
+
+  /// The mesh's own weights count where the node has none; those of other lengths are an error.
+  Result<std::vector<double>> weights_of(uint32_t node) const {
+    const uint32_t m = *document_.nodes[node].mesh;
+    const gltf::Mesh& mesh = document_.meshes[m];
+    const size_t targets = mesh.primitives.empty() ? 0 : mesh.primitives.front().targets.size();
+    const auto own = document_.node_weights.find(node);
+    if (own == document_.node_weights.end()) return rest_weights_.contains(m) ? rest_weights_.at(m) : mesh.weights;
+    if (own->second.size() != targets) {
+      return Error{ErrorCode::kInput,
+                   fmt::format("{}: nodes[{}]: expected {} weights, one a morph target of meshes[{}], found {}",
+                               document_.path, node, targets, m, own->second.size())};
+    }
+    return own->second;
+  }
+
+  Status pose_mesh(uint32_t index) {
+    gltf::Node& node = document_.nodes[index];
+    const uint32_t m = *node.mesh;
+    SHOAL_ASSIGN_OR_RETURN(std::vector<double> weights, weights_of(index));
+    std::shared_ptr<const gltf::JointMatrices> joints;
+    if (node.skin && document_.instancings.contains(index)) {
+      warnings_.push_back(fmt::format("nodes[{}] is instanced: its skin is left out", index));
+    } else if (node.skin) {
+      joints = skins_[*node.skin];
+    }
+    if (!users_.contains(m)) {
+      users_.insert(m);
+      rest_weights_.emplace(m, document_.meshes[m].weights);
+      document_.meshes[m].weights = std::move(weights);
+      document_.meshes[m].joints = std::move(joints);
+      return {};
+    }
+    const gltf::Mesh& shown = document_.meshes[m];
+    // What goes by its joints lies in world space, so it is not shared even where it is the same.
+    if (!joints && !shown.joints && weights == shown.weights) return {};
+    gltf::Mesh copy = shown;
+    copy.weights = std::move(weights);
+    copy.joints = std::move(joints);
+    node.mesh = static_cast<uint32_t>(document_.meshes.size());
+    document_.meshes.push_back(std::move(copy));
+    return {};
+  }
+
+  gltf::BufferFiles& files_;
+  gltf::Document& document_;
+  std::vector<std::string>& warnings_;
+  std::map<uint32_t, AffineDouble> worlds_;  // of joints
+  std::vector<std::shared_ptr<const gltf::JointMatrices>> skins_;
+  std::set<uint32_t> users_;                              // meshes that a node shows
+  std::map<uint32_t, std::vector<double>> rest_weights_;  // of those, as the document has them
+};
+
+bool has_targets(const gltf::Document& document) {
+  for (const gltf::Mesh& mesh : document.meshes) {
+    if (!mesh.primitives.empty() && !mesh.primitives.front().targets.empty()) return true;
+  }
+  return false;
+}
+
+/// Of one more pose of a mesh; an attribute is a name and a node of a map.
+uint64_t copy_bytes(const gltf::Mesh& mesh) {
+  constexpr uint64_t kAttributeBytes = 96;
+  uint64_t bytes = sizeof(gltf::Mesh) + mesh.name.size();
+  for (const gltf::Primitive& primitive : mesh.primitives) {
+    bytes += sizeof(gltf::Primitive) + primitive.attributes.size() * kAttributeBytes +
+             primitive.targets.size() * (sizeof(gltf::MorphTarget) + sizeof(double));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+Result<std::optional<ChosenPose>> choose_pose(const gltf::Document& document, const PoseOptions& options) {
+  if (!options.wanted()) return std::optional<ChosenPose>();
+  const auto wrong = [&](const std::string& message) {
+    return Error{ErrorCode::kUsage, fmt::format("{}: {}", document.path, message)};
+  };
+  if (options.time && !std::isfinite(*options.time)) return wrong("a time must be a finite number of seconds");
+  const std::vector<gltf::Animation>& animations = document.animations;
+  if (animations.empty()) return wrong("a time or an animation was asked for, the scene has no animation");
+  ChosenPose pose;
+  pose.time = options.time.value_or(0);
+  if (!options.animation.empty()) {
+    const auto named = std::find_if(animations.begin(), animations.end(),
+                                    [&](const gltf::Animation& a) { return a.name == options.animation; });
+    pose.animation = named != animations.end() ? static_cast<uint32_t>(named - animations.begin())
+                                               : index_of(options.animation).value_or(0xffffffffu);
+    if (pose.animation >= animations.size()) {
+      return wrong(fmt::format("the animation '{}' was asked for, the scene has {}", options.animation,
+                               animations.size()));
+    }
+  }
+  pose.name = animations[pose.animation].name;
+  return std::optional<ChosenPose>(std::move(pose));
+}
+
+uint64_t pose_bytes(const gltf::Document& document) {
+  // The matrices, and the world matrices that they are made of.
+  constexpr uint64_t kJointBytes = 12 * sizeof(double) + sizeof(AffineDouble) + 64;
+  uint64_t bytes = 0;
+  for (const gltf::Skin& skin : document.skins) bytes += skin.joints.size() * kJointBytes;
+  if (document.skins.empty() && !has_targets(document)) return bytes;
+  std::set<uint32_t> shown;
+  std::vector<uint32_t> stack = document.roots;
+  while (!stack.empty()) {
+    const gltf::Node& node = document.nodes[stack.back()];
+    stack.pop_back();
+    stack.insert(stack.end(), node.children.begin(), node.children.end());
+    if (node.mesh && !shown.insert(*node.mesh).second) bytes += copy_bytes(document.meshes[*node.mesh]);
+  }
+  return bytes;
+}
+
+Status pose_document(gltf::BufferFiles& files, gltf::Document& document, const std::optional<ChosenPose>& pose,
+                     std::vector<std::string>& warnings) {
+  Poser poser(files, document, warnings);
+  if (pose) SHOAL_RETURN_IF_ERROR(poser.animate(*pose));
+  if (document.skins.empty() && !has_targets(document)) return {};
+  return poser.pose_meshes();
+}
+
+Status check_pose(const Scene& scene, const PoseOptions& options) {
+  if (!options.wanted()) return {};
+  const auto record = nlohmann::json::parse(scene.build_record, nullptr, false);
+  const nlohmann::json built = record.is_object() ? record.value("options", nlohmann::json()) : nlohmann::json();
+  const bool posed = built.is_object() && built.contains("animation") && built["animation"].is_number_unsigned() &&
+                     built.contains("time") && built["time"].is_number();
+  std::string found = "with its nodes at rest";
+  if (posed) {
+    const auto index = built["animation"].get<uint32_t>();
+    const std::string name = built.value("animation_name", std::string());
+    const bool animation = options.animation.empty() ? index == 0
+                                                     : options.animation == name || index_of(options.animation) == index;
+    if (animation && built["time"].get<double>() == options.time.value_or(0)) return {};
+    found = fmt::format("at {} s of animation {}{}", built["time"].get<double>(), index,
+                        name.empty() ? "" : " (" + name + ")");
+  }
+  return Error{ErrorCode::kUsage,
+               fmt::format("{} was built {}: build it again with the --time and --animation that are asked for, or render "
+                           "the glTF itself", scene.file->path(), found)};
+}
+
+}  // namespace shoal
