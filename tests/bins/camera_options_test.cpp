@@ -57,7 +57,7 @@ TEST(CameraOptions, ALensBlursAndEveryOrderBlursTheSame) {
   const std::vector<std::string> lens = {"--aperture", "0.4", "--focus", "1.5"};
   const std::vector<float> plain = pictures.render("plain", {}), blurred = pictures.render("blurred", lens);
   EXPECT_NE(blurred, plain);
-  for (const char* order : {"queued", "depth-first", "sorted"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid"}) {
     EXPECT_EQ(pictures.render(order, join(lens, {"--order", order, "--threads", "1"})), blurred) << order;
   }
   EXPECT_NE(pictures.render("stop", {"--aperture", "f/1.4", "--focus", "1.5"}), plain);
@@ -65,7 +65,7 @@ TEST(CameraOptions, ALensBlursAndEveryOrderBlursTheSame) {
 
 TEST(CameraOptions, OutsideTheCircleOfAFisheyeThePictureIsBlackAndClear) {
   const Pictures pictures;
-  for (const char* order : {"queued", "depth-first", "sorted"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid"}) {
     const std::vector<float> picture = pictures.render("fisheye", {"--projection", "fisheye", "--order", order});
     for (size_t channel = 0; channel < 4; ++channel) EXPECT_EQ(picture[channel * 48 * 32], 0) << channel;
     size_t lit = 0;
