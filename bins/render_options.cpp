@@ -184,6 +184,14 @@ Status check_output(const std::string& path) {
 void declare_pose(CLI::App& app, PoseOptions& pose) {
   app.add_option("--time", pose.time, "seconds into the animation that the scene is posed at (default: nodes at rest)");
   app.add_option("--animation", pose.animation, "its name or index (default: the first)")->type_name("NAME|INDEX");
+  app.add_option_function<std::string>(
+         "--shutter",
+         [](const std::string&) {
+           throw CLI::ValidationError("--shutter", "there is no motion blur yet: leave it out, or render several --time and "
+                                                   "take the mean of the pictures");
+         },
+         "refused: there is no motion blur yet")
+      ->type_name("OPEN:CLOSE");
 }
 
 void RenderArguments::declare(CLI::App& app) {

@@ -96,6 +96,13 @@ TEST(CameraOptions, ABuiltSceneKeepsItsTime) {
   expect_error(pictures.run("wrong", {"--time", "0", "--animation", "stay"}), 2, {"'stay'", "the scene has 1"});
 }
 
+TEST(CameraOptions, AShutterIsRefusedWithWhatToDo) {
+  const Pictures pictures;
+  const ProgramRun run = pictures.run("wrong", {"--shutter", "0:0.02"});
+  expect_exit(run, 2);
+  EXPECT_THAT(run.err, ::testing::HasSubstr("several --time"));
+}
+
 TEST(CameraOptions, WhatDoesNotGoTogetherExitsTwo) {
   const Pictures pictures;
   for (const std::vector<std::string>& options :
