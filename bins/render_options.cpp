@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -61,7 +62,7 @@ Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& c
   if (!asked.empty()) {
     const EnvironmentOptions& sky = prepared.picture.shading.environment;
     if (prepared.scene.emitters.empty() && prepared.scene.lights.empty() &&
-        sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)) {
+        (sky.intensity == 0 || (sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)))) {
       console.warning("the scene has no light and the environment is black: the picture will be black");
     }
     return {};
@@ -88,6 +89,19 @@ Status fit_cap(const PageFile& file, const std::vector<Order>& orders, bool pict
   }
   prepared.execution.process_bytes = plan.process_bytes;
   return {};
+}
+
+Result<EnvironmentOptions> chosen_environment(const RenderArguments& arguments) {
+  SHOAL_ASSIGN_OR_RETURN(EnvironmentOptions chosen, parse_environment(arguments.environment));
+  chosen.rotation = arguments.picture.shading.environment.rotation;
+  chosen.intensity = arguments.picture.shading.environment.intensity;
+  if (!std::isfinite(chosen.rotation)) {
+    return Error{ErrorCode::kUsage, fmt::format("--environment-rotation {}: expected degrees", chosen.rotation)};
+  }
+  if (!(chosen.intensity >= 0) || chosen.intensity > 1e30f) {
+    return Error{ErrorCode::kUsage, fmt::format("--environment-intensity {}: expected a number >= 0", chosen.intensity)};
+  }
+  return chosen;
 }
 
 Result<uint64_t> size_or_zero(const std::string& text) {
@@ -203,7 +217,20 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   declare_lens(app, picture);
   declare_pose(app, pose);
-  app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
+  CLI::Option* sky = app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
+  app.add_option("--environment-rotation", picture.shading.environment.rotation,
+                 "degrees by which the environment is turned, counter-clockwise seen from above")
+      ->capture_default_str()
+      ->needs(sky);
+  app.add_option("--environment-intensity", picture.shading.environment.intensity,
+                 "what its radiance is multiplied by")
+      ->capture_default_str()
+      ->needs(sky);
+  static const std::map<std::string, LightChoice> kLightChoices{{"tree", LightChoice::kTree},
+                                                                {"power", LightChoice::kPower}};
+  add_choice(app, "--light-choice", picture.shading.light_choice, kLightChoices,
+             ": by what one of many lights is chosen")
+      ->group("For experiments");
   app.add_option("--variant", variant, kVariantHelp);
   app.add_option("--effects", effects,
                  "force effects of materials off or on: -NAME or +NAME, separated by commas (--effects=-sheen), all, "
@@ -266,7 +293,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   prepared.execution = arguments.execution;
   SHOAL_ASSIGN_OR_RETURN(prepared.execution.max_memory_bytes, size_or_zero(arguments.max_memory));
   SHOAL_ASSIGN_OR_RETURN(prepared.execution.page_cache_bytes, size_or_zero(arguments.page_cache));
-  SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, parse_environment(arguments.environment));
+  SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, chosen_environment(arguments));
   SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.effects, parse_effects(arguments.effects));
   if (!arguments.variant.empty() && is_shoal_file(arguments.scene)) {
     return Error{ErrorCode::kUsage, "--variant is of a .gltf or .glb: a .shoal holds the variant that it was built with"};

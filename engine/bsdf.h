@@ -49,6 +49,7 @@ class Bsdf {
   Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3& geometric_normal,
        const Vec3& shading_normal, const Vec3& wo);
 
+  static constexpr bool transmits() { return false; }
   bool black() const { return specular_probability_ + diffuse_probability_ == 0; }
   /// Zero when `wi` is below the surface, geometric or shading.
   BsdfValue evaluate(const Vec3& wi) const;

@@ -1,17 +1,14 @@
 #include "engine/environment.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/frame.h"
 #include "engine/math.h"
 
 namespace shoal {
 namespace {
-
-/// Where a direction falls in the picture, u and v in [0, 1].
-Vec2 picture_coordinates(const Vec3& d) {
-  return {0.5f + arc_tangent(d.x, -d.z) / (2 * kPi), arc_cosine(d.y) / kPi};
-}
 
 /// Solid angle per unit of u v area is 2 pi^2 sin(theta).
 float solid_angle_pdf(double uv_pdf, float sin_theta) {
@@ -20,11 +17,15 @@ float solid_angle_pdf(double uv_pdf, float sin_theta) {
 
 }  // namespace
 
-Environment::Environment(ImageF image) : image_(std::move(image)) {
+Environment::Environment(ImageF image, float rotation_degrees, float intensity) : image_(std::move(image)) {
   for (float& value : image_.rgb) {
     if (!(value > 0)) value = 0;
     if (std::isinf(value)) value = 65504.0f;
+    value = std::min(value * intensity, std::numeric_limits<float>::max());
   }
+  const double turn = double{rotation_degrees} / 360;
+  turn_ = static_cast<float>(turn - std::floor(turn));
+  if (turn_ >= 1) turn_ = 0;  // rounded up
   const uint32_t width = image_.width, height = image_.height;
   if (width == 0 || height == 0) {
     image_ = {};
@@ -56,6 +57,10 @@ Vec3 Environment::texel(uint32_t x, uint32_t y) const {
   return {p[0], p[1], p[2]};
 }
 
+Vec2 Environment::picture_coordinates(const Vec3& d) const {
+  return {0.5f + arc_tangent(d.x, -d.z) / (2 * kPi) + turn_, arc_cosine(d.y) / kPi};
+}
+
 Vec3 Environment::radiance(const Vec3& direction) const {
   if (image_.rgb.empty()) return constant_;
   const Vec2 uv = picture_coordinates(direction);
@@ -75,13 +80,15 @@ Vec3 Environment::radiance(const Vec3& direction) const {
 float Environment::pdf(const Vec3& direction) const {
   if (!sampled()) return 0;
   const float sin_theta = std::sqrt(direction.x * direction.x + direction.z * direction.z);
-  return solid_angle_pdf(distribution_.pdf(picture_coordinates(direction)), sin_theta);
+  Vec2 uv = picture_coordinates(direction);
+  if (uv.x >= 1 && turn_ > 0) uv.x -= 1;
+  return solid_angle_pdf(distribution_.pdf(uv), sin_theta);
 }
 
 Vec3 Environment::sample(double u1, double u2, float* pdf) const {
   double uv_pdf = 0;
   const Vec2 uv = distribution_.sample(u1, u2, &uv_pdf);
-  const SinCos theta = sin_cos(kPi * uv.y), phi = sin_cos(2 * kPi * (uv.x - 0.5f));
+  const SinCos theta = sin_cos(kPi * uv.y), phi = sin_cos(2 * kPi * (uv.x - 0.5f - turn_));
   *pdf = solid_angle_pdf(uv_pdf, theta.sin);
   return {theta.sin * phi.sin, theta.cos, -theta.sin * phi.cos};
 }

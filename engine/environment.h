@@ -1,7 +1,8 @@
 // Light from infinitely far: none, one radiance for all directions, or an equirectangular picture.
 //
 // Picture: glTF axes, +y up. Row 0 is the top (+y); u = 0.5 + atan2(x, -z) / (2 pi), v = acos(y) / pi, so that the
-// middle column looks along -z and +x lies to its right. Filtered bilinearly, wrapping in u. Directions are drawn
+// middle column looks along -z and +x lies to its right. Turned by R degrees about +y, counter-clockwise seen from
+// above: what was seen along -z is then seen along -x for R = 90. Filtered bilinearly, wrapping in u. Directions are drawn
 // from a 2D distribution of luminance * sin(theta) (Pharr et al., Physically Based Rendering 4e, section 12.5.2).
 // A constant sky is not sampled as a light: BSDF sampling already follows it, and a shadow ray could do no better.
 // Called by engine/shade and engine/light_sampler. Immutable.
@@ -21,7 +22,8 @@ class Environment {
   Environment() = default;  ///< black
   explicit Environment(const Vec3& radiance) : constant_(radiance) {}
   /// Texels that are negative or not a number count as 0, infinite ones as 65504 (the largest half).
-  explicit Environment(ImageF image);
+  /// `intensity` >= 0 multiplies them.
+  explicit Environment(ImageF image, float rotation_degrees = 0, float intensity = 1);
 
   bool black() const { return image_.rgb.empty() && constant_ == Vec3(0); }
   /// Directions can be drawn: a picture that is not black.
@@ -38,11 +40,14 @@ class Environment {
 
  private:
   Vec3 texel(uint32_t x, uint32_t y) const;
+  /// Where a direction falls in the picture: v in [0, 1], u in [0, 2).
+  Vec2 picture_coordinates(const Vec3& direction) const;
 
   Vec3 constant_{0};
   ImageF image_;
   Distribution2D distribution_;
   float mean_luminance_ = 0;
+  float turn_ = 0;  ///< of the picture, in turns, [0, 1)
 };
 
 }  // namespace shoal

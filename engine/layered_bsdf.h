@@ -56,6 +56,8 @@ class LayeredBsdf {
               const Vec3& shading_normal, const Vec3& wo);
 
   bool black() const { return black_; }
+  /// Some lobe of this one reaches below; else evaluate() is zero there.
+  bool transmits() const { return probability_[kDiffuseBelow] + probability_[kThin] + probability_[kGlass] > 0; }
   /// `wi` on either side.
   BsdfValue evaluate(const Vec3& wi) const;
   BsdfSample sample(float u_lobe, float u1, float u2) const;

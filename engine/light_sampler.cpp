@@ -1,9 +1,11 @@
 #include "engine/light_sampler.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/frame.h"
 #include "engine/math.h"
+#include "engine/tree_lights.h"
 
 namespace shoal {
 namespace {
@@ -37,6 +39,9 @@ double punctual_power(const PunctualLight& light, double radius) {
   return 0;
 }
 
+double power_of(const Emitter&, double strength) { return 2 * kPi * strength; }
+double power_of(const PunctualLight& light, double) { return punctual_power(light, 1); }
+
 /// Angular attenuation of KHR_lights_punctual: (cos - cos_outer) / (cos_inner - cos_outer), clamped, squared.
 float spot_attenuation(const PunctualLight& light, float cosine) {
   const float scale = 1 / std::max(0.001f, light.cos_inner - light.cos_outer);
@@ -55,47 +60,131 @@ double range_attenuation(const PunctualLight& light, double distance2) {
 
 double emitter_area(const Emitter& emitter) { return 0.5 * glm::length(doubled_area_vector(emitter)); }
 
-LightSampler::LightSampler(const Scene& scene, const Environment& environment)
+LightSampler::LightSampler(const Scene& scene, const Environment& environment, unsigned threads, uint64_t few)
     : scene_(&scene), environment_(&environment) {
-  weigh_emitters();
-  const double radius = scene_radius(scene);
+  plant_tree(threads, few);
+  if (!has_tree()) weigh_emitters();
+  weigh_choices();
+}
+
+double LightSampler::weight_of(const Emitter& emitter) const {
+  const double weight = emitter_area(emitter) * sampled_weight(scene_->materials[emitter.material]);
+  return weight > 0 && std::isfinite(weight) ? weight : 0.0;
+}
+
+template <class Use>
+void LightSampler::each_placed(const Use& use) const {
+  for (uint32_t i = 0; i < scene_->emitters.size(); ++i) {
+    if (const double weight = weight_of(scene_->emitters[i]); weight > 0) use(scene_->emitters[i], weight, i);
+  }
+  for (uint32_t i = 0; i < scene_->lights.size(); ++i) {
+    const PunctualLight& light = scene_->lights[i];
+    const double intensity = luminance(vector3(light.intensity));
+    if (light.type == PunctualType::kDirectional || !(power_of(light, intensity) > 0) || !std::isfinite(intensity)) {
+      continue;
+    }
+    use(light, intensity, static_cast<uint32_t>(scene_->emitters.size()) + i);
+  }
+}
+
+void LightSampler::weigh_choices() {
+  const std::vector<PunctualLight>& lights = scene_->lights;
+  for (uint32_t i = 0; i < lights.size(); ++i) {
+    if (!has_tree() || lights[i].type == PunctualType::kDirectional) singles_.push_back(i);
+  }
+
+  const double radius = scene_radius(*scene_);
   std::vector<double> powers;
-  for (const PunctualLight& light : scene.lights) powers.push_back(punctual_power(light, radius));
-  powers.push_back(2 * kPi * emitters_.total());
-  powers.push_back(environment.sampled() ? 4.0 * kPi * kPi * radius * radius * environment.mean_luminance() : 0.0);
+  for (const uint32_t i : singles_) powers.push_back(punctual_power(lights[i], radius));
+  powers.push_back(placed_power());
+  powers.push_back(environment_->sampled() ? 4.0 * kPi * kPi * radius * radius * environment_->mean_luminance() : 0.0);
 
   double sum = 0, count = 0;
   for (const double p : powers) {
     if (p > 0 && std::isfinite(p)) sum += p, ++count;
   }
   for (double& p : powers) p = p > 0 && std::isfinite(p) ? 0.5 * p / sum + 0.5 / count : 0.0;
-  lights_ = Distribution1D(powers);
-  if (emitters_.total() > 0) emitter_density_ = lights_.probability(scene.lights.size()) / emitters_.total();
+  choices_ = Distribution1D(powers);
+  if (emitters_.total() > 0) emitter_density_ = choices_.probability(singles_.size()) / emitters_.total();
 }
 
 void LightSampler::weigh_emitters() {
   std::vector<double> weights;
   weights.reserve(scene_->emitters.size());
-  for (const Emitter& e : scene_->emitters) {
-    weights.push_back(emitter_area(e) * sampled_weight(scene_->materials[e.material]));
-  }
+  for (const Emitter& e : scene_->emitters) weights.push_back(weight_of(e));
   emitters_ = Distribution1D(weights);
 }
 
-LightSample LightSampler::sample(const Vec3& position, const LightRandom& random) const {
-  double inside = 0;
-  const size_t light = lights_.sample(random.choice, &inside);
-  const double chance = lights_.probability(light);
-  const size_t punctual_count = scene_->lights.size();
-  if (light < punctual_count) return sample_punctual(scene_->lights[light], position, chance);
-  if (light == punctual_count) return sample_emitter(position, chance, inside, random);
-  return sample_environment(chance, random);
+double LightSampler::placed_power() const {
+  if (!has_tree()) return 2 * kPi * emitters_.total();
+  double power = 0;
+  each_placed([&](const auto& light, double strength, uint32_t) { power += power_of(light, strength); });
+  return power;
 }
 
-LightSample LightSampler::sample_emitter(const Vec3& position, double chance, double choice,
+void LightSampler::plant_tree(unsigned threads, uint64_t few) {
+  // Strengths go to the tree as parts of the largest, so that floats hold them and their sum.
+  double largest = 0;
+  uint64_t count = 0;
+  each_placed([&](const auto&, double strength, uint32_t) { largest = std::max(largest, strength), ++count; });
+  if (count <= few) return;
+  std::vector<TreeLight> lights;
+  lights.reserve(count);
+  each_placed([&](const auto& light, double strength, uint32_t index) {
+    lights.push_back(tree_light(light, strength / largest, index));
+  });
+  const size_t indices = scene_->emitters.size() + scene_->lights.size();
+  tree_ = build_light_tree(std::move(lights), static_cast<uint32_t>(indices), threads);
+}
+
+LightSampler::Bytes LightSampler::bytes_at_most(uint64_t emitters, uint64_t punctual) {
+  const uint64_t lights = emitters + punctual;
+  Bytes bytes;
+  bytes.resident = emitters * sizeof(double) + punctual * (sizeof(double) + sizeof(uint32_t)) + 4 * sizeof(double);
+  bytes.making = lights * sizeof(double);
+  if (lights <= kFewLights) return bytes;
+  bytes.resident = std::max(bytes.resident, light_tree_bytes(lights, lights) +
+                                                punctual * (sizeof(double) + sizeof(uint32_t)));
+  bytes.making = lights * sizeof(TreeLight);
+  return bytes;
+}
+
+uint64_t LightSampler::resident_bytes() const {
+  return choices_.resident_bytes() + emitters_.resident_bytes() + tree_.resident_bytes() +
+         singles_.size() * sizeof(uint32_t);
+}
+
+LightSample LightSampler::sample(const Vec3& position, const LightReceiver& receiver,
+                                 const LightRandom& random) const {
+  double inside = 0;
+  const size_t choice = choices_.sample(random.choice, &inside);
+  const double chance = choices_.probability(choice);
+  if (choice < singles_.size()) return sample_punctual(scene_->lights[singles_[choice]], position, chance);
+  if (choice > singles_.size()) return sample_environment(chance, random);
+  if (!has_tree()) {
+    const size_t index = emitters_.sample(inside, nullptr);
+    return sample_emitter(index, position, chance * emitters_.probability(index), random);
+  }
+  const LightTree::Choice placed = tree_.sample(receiver, inside);
+  if (!(placed.chance > 0)) return {};
+  const size_t emitters = scene_->emitters.size();
+  if (placed.light < emitters) return sample_emitter(placed.light, position, chance * placed.chance, random);
+  return sample_punctual(scene_->lights[placed.light - emitters], position, chance * placed.chance);
+}
+
+double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const {
+  const std::vector<Emitter>& emitters = scene_->emitters;
+  const auto found = std::lower_bound(emitters.begin(), emitters.end(), hit, [](const Emitter& e, const Hit& h) {
+    return e.instance != h.instance ? e.instance < h.instance : e.primitive < h.primitive;
+  });
+  if (found == emitters.end() || found->instance != hit.instance || found->primitive != hit.primitive) return 0;
+  const double chance = tree_.chance(receiver, static_cast<uint32_t>(found - emitters.begin()));
+  return chance > 0 ? choices_.probability(singles_.size()) * chance / emitter_area(*found) : 0.0;
+}
+
+LightSample LightSampler::sample_emitter(size_t index, const Vec3& position, double chance,
                                          const LightRandom& random) const {
   LightSample sample;
-  const size_t index = emitters_.sample(choice, nullptr);
   const Emitter& e = scene_->emitters[index];
   const DVec3 area_vector = doubled_area_vector(e);
   const double doubled_area = glm::length(area_vector);
@@ -116,7 +205,7 @@ LightSample LightSampler::sample_emitter(const Vec3& position, double chance, do
   sample.target_normal = Vec3(area_vector * ((cosine > 0 ? -1 : 1) / doubled_area));
   sample.radiance = Vec3(1);
   sample.emitter = &e;
-  sample.pdf = chance * emitters_.probability(index) / (0.5 * doubled_area) * distance2 / std::abs(cosine);
+  sample.pdf = chance / (0.5 * doubled_area) * distance2 / std::abs(cosine);
   return sample;
 }
 
@@ -155,7 +244,7 @@ LightSample LightSampler::sample_environment(double chance, const LightRandom& r
 
 double LightSampler::environment_pdf(const Vec3& direction) const {
   if (!environment_->sampled()) return 0;
-  return lights_.probability(scene_->lights.size() + 1) * environment_->pdf(direction);
+  return choices_.probability(singles_.size() + 1) * environment_->pdf(direction);
 }
 
 }  // namespace shoal

@@ -1,17 +1,22 @@
 // One light sample a vertex: which light, which point or direction on it, and with what density.
 //
-// Lights are: all emissive triangles together, each punctual light, and an environment picture. One is chosen with
-// fixed probabilities, half by power and half evenly, so that neither a dim light nearby nor a bright one far away
-// is starved. Powers: emitters 2 pi * sum(area * luminance), point 4 pi I, spot 2 pi (1 - cos outer) I, directional
-// pi R^2 E, environment 4 pi^2 R^2 * mean luminance (R: half the diagonal of the scene).
-// Among emissive triangles the probability is proportional to area * Material::emission_weight, and the
-// point is uniform: the density by area is emission_weight / total, known from a material alone (emitter_pdf).
-// Called by engine/shade. Immutable; a sample costs two binary searches.
+// Lights are emissive triangles, point and spot lights, directional lights, and an environment picture. The first three
+// are **placed**: where there are more than kFewLights of them, they are one choice among the others, and a tree
+// (engine/light_tree) says which of them, by what each may bring to the vertex. With fewer, all emissive triangles
+// together are one choice and each point or spot light is one; among the triangles the chance is proportional to area *
+// Material::emission_weight, so that their density is known from a material alone.
+// Among these choices the chances are fixed, half by power and half evenly, so that neither a dim light nearby nor a
+// bright one far away is starved. Powers: emitters 2 pi * area * luminance, point 4 pi I, spot 2 pi (1 - cos outer) I,
+// directional pi R^2 E, environment 4 pi^2 R^2 * mean luminance (R: half the diagonal of the scene). The point on a
+// triangle is uniform.
+// Called by engine/shade. Immutable; a sample costs a binary search, and two or the way down the tree.
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "engine/environment.h"
+#include "engine/light_tree.h"
 #include "engine/sample_distribution.h"
 #include "engine/scene.h"
 #include "engine/surface_error.h"
@@ -39,18 +44,34 @@ struct LightSample {
 
 class LightSampler {
  public:
-  /// Keeps references to both.
-  LightSampler(const Scene& scene, const Environment& environment);
+  /// So many placed lights have no tree: two triangles are one lamp, and two lamps gain less than a tree costs.
+  static constexpr uint64_t kFewLights = 2;
 
-  bool empty() const { return !(lights_.total() > 0); }
-  /// Requires: !empty().
-  LightSample sample(const Vec3& position, const LightRandom& random) const;
+  /// Keeps references to both. `threads` build the tree, if there are more placed lights than `few`.
+  LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights);
 
-  /// Density by area with which sample() finds a point on an emitter of this material; 0 when it never does.
-  double emitter_pdf(const Material& material) const { return emitter_density_ * sampled_weight(material); }
+  bool empty() const { return !(choices_.total() > 0); }
+  /// Light is chosen by where it arrives: without, the receiver that the others take does not matter.
+  bool has_tree() const { return !tree_.empty(); }
+  /// Requires: !empty(). Light is chosen for `receiver` and sampled from `position`.
+  LightSample sample(const Vec3& position, const LightReceiver& receiver, const LightRandom& random) const;
+
+  /// Density by area with which sample() finds a point on the emissive triangle that was hit, of this material; 0 when it
+  /// never does.
+  double emitter_pdf(const Material& material, const Hit& hit, const LightReceiver& receiver) const {
+    if (has_tree()) return tree_emitter_pdf(hit, receiver);
+    return emitter_density_ * sampled_weight(material);
+  }
   /// Solid-angle density with which sample() finds a direction to the environment.
   double environment_pdf(const Vec3& direction) const;
-  uint64_t resident_bytes() const { return lights_.resident_bytes() + emitters_.resident_bytes(); }
+
+  uint64_t resident_bytes() const;
+  /// Of a scene with so many emissive triangles and punctual lights: at most what resident_bytes() will be, and what is
+  /// needed beside it while it is made.
+  struct Bytes {
+    uint64_t resident = 0, making = 0;
+  };
+  static Bytes bytes_at_most(uint64_t emitters, uint64_t punctual);
 
  private:
   /// Emitters with coverage are found by chance only: a shadow ray ends before the emitter and so cannot ask whether
@@ -58,16 +79,26 @@ class LightSampler {
   static double sampled_weight(const Material& material) {
     return material.coverage == CoverageMode::kOpaque ? material.emission_weight : 0.0f;
   }
+  double weight_of(const Emitter& emitter) const;
+  void weigh_choices();
+  void plant_tree(unsigned threads, uint64_t few);
+  double placed_power() const;
+  /// Calls use(light, strength, its index in the tree) for each placed light that gives any light.
+  template <class Use>
+  void each_placed(const Use& use) const;
   void weigh_emitters();
-  LightSample sample_emitter(const Vec3& position, double chance, double choice, const LightRandom& random) const;
+  LightSample sample_emitter(size_t index, const Vec3& position, double chance, const LightRandom& random) const;
   LightSample sample_punctual(const PunctualLight& light, const Vec3& position, double chance) const;
   LightSample sample_environment(double chance, const LightRandom& random) const;
+  double tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const;
 
   const Scene* scene_;
   const Environment* environment_;
-  Distribution1D lights_;  ///< punctual lights, then the emitters as one, then the environment
-  Distribution1D emitters_;
-  double emitter_density_ = 0;  ///< chance of the emitters / sum of area * weight
+  std::vector<uint32_t> singles_;  ///< indices of the punctual lights that are a choice each
+  Distribution1D choices_;         ///< singles_, then the tree or the emitters as one, then the environment
+  LightTree tree_;                 ///< emitters by their index, then punctual lights
+  Distribution1D emitters_;        ///< without a tree
+  double emitter_density_ = 0;     ///< likewise: chance of the emitters / sum of area * weight
 };
 
 /// World area of an emissive triangle.

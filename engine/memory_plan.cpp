@@ -8,6 +8,7 @@
 
 #include "engine/film.h"
 #include "engine/hybrid_paths.h"
+#include "engine/light_sampler.h"
 #include "engine/path_ray.h"
 #include "engine/preview.h"
 #include "engine/process_memory.h"
@@ -222,10 +223,12 @@ Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, cons
   const uint64_t emitters = size_of(file, tables::kEmitters) / sizeof(Emitter);
   const uint64_t entries = size_of(file, tables::kEntries) / sizeof(TreeletEntry);
   const uint64_t directory = file.records().size_bytes();
-  sizes.table_bytes += directory + entries * sizeof(uint32_t) + emitters * sizeof(double) + kSmallTableBytes;
+  const LightSampler::Bytes lights =
+      LightSampler::bytes_at_most(emitters, size_of(file, tables::kLights) / sizeof(PunctualLight));
+  sizes.table_bytes += directory + entries * sizeof(uint32_t) + lights.resident + kSmallTableBytes;
   const bool layers = size_of(file, tables::kMaterialLayers) > 0 || (picture.shading.effects.on & kLayerEffects) != 0;
   if (layers) sizes.table_bytes += kLobeTableBytes;
-  sizes.reading_bytes = std::max<uint64_t>(kTablePageBytes + 2 * kPageAlignment, emitters * sizeof(double));
+  sizes.reading_bytes = std::max<uint64_t>(kTablePageBytes + 2 * kPageAlignment, lights.making);
   const EnvironmentOptions& environment = picture.shading.environment;
   if (environment.kind == EnvironmentOptions::Kind::kImage) {
     SHOAL_ASSIGN_OR_RETURN(const HdrImageSize image,

@@ -16,7 +16,8 @@ struct PathState {
   uint32_t pixel = 0;               ///< y * width + x in the film
   uint32_t sample = 0;
   uint32_t bounce = 0;              ///< 0: the camera ray's hit is shaded next
-  uint32_t flags = 0;               ///< PathFlags: the render loop's, not the shader's
+  uint32_t flags : 2 = 0;           ///< PathFlags: the render loop's, not the shader's
+  uint32_t light_side : 30 = 0;     ///< LightReceiver::side of the vertex before, the shader's; of the camera nothing
   Vec3 throughput{1};
   float bsdf_pdf = 0;               ///< solid-angle density of `direction`; 0: camera (no MIS)
   Vec3 radiance{0};

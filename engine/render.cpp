@@ -104,7 +104,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(check_options(scene, picture, asked));
   ExecutionOptions execution = asked;
   if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
-  SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading));
+  SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading,
+                                                                                        execution.threads));
   SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, *tables, picture, execution));
   execution.paging.read_depth = plan.read_depth;
   if (hooks.planned) hooks.planned(plan);

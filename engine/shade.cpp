@@ -43,6 +43,13 @@ Vec3 side_of(const Vec3& normal, const Vec3& direction) {
   return normal;
 }
 
+/// LightReceiver::side: light must come from above the geometric normal, unless it may pass. As a code, so that a path
+/// can carry it to the next vertex, where the chance of the light that it hits is asked for.
+template <class AnyBsdf>
+uint32_t light_side(const Surface& surface, const AnyBsdf& bsdf) {
+  return bsdf.transmits() ? 0 : encode_direction(surface.geometric_normal);
+}
+
 }  // namespace
 
 Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
@@ -95,8 +102,11 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
   SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
                          sample_emission(material, surface.uv(material.emissive_texture.uv_set), textures));
   float weight = 1;
-  const double area_pdf = tables_->impl().lights->emitter_pdf(material);
-  if (path.bsdf_pdf > 0 && area_pdf > 0) {
+  double area_pdf = 0;  // the camera draws no light
+  if (path.bsdf_pdf > 0) {
+    area_pdf = tables_->impl().lights->emitter_pdf(material, path.hit, {path.origin, path.light_side});
+  }
+  if (area_pdf > 0) {
     const glm::dvec3 along = glm::dvec3(surface.position.point) - glm::dvec3(path.origin);
     const double cosine = glm::dot(surface.geometric_normal, surface.wo);
     weight = cosine > 0 ? mis_weight(path.bsdf_pdf, area_pdf * glm::dot(along, along) / cosine) : 0.0f;
@@ -111,8 +121,13 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
   const LightSampler& lights = *tables_->impl().lights;
   if (lights.empty()) return {};
   const Random4 random = path_random(path, options_->seed, Dimension::kLight);
-  const LightSample light = lights.sample(
-      surface.position.point, {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)});
+  LightReceiver receiver;
+  if (lights.has_tree()) {
+    receiver = {offset_point(surface.position, surface.geometric_normal), light_side(surface, bsdf)};
+  }
+  const LightSample light =
+      lights.sample(surface.position.point, receiver,
+                    {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)});
   if (!(light.pdf > 0)) return {};
   const BsdfValue f = bsdf.evaluate(light.direction);
   if (f.value == Vec3(0)) return {};
@@ -164,6 +179,7 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsd
   }
   path.throughput = throughput;
   path.bsdf_pdf = sample.pdf;
+  if (tables_->impl().lights->has_tree()) path.light_side = light_side(surface, bsdf);
   ++path.bounce;
   result.has_bounce = true;
   const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, sample.direction);

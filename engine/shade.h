@@ -25,7 +25,12 @@ struct EnvironmentOptions {
   enum class Kind : uint8_t { kNone, kConstant, kImage } kind = Kind::kNone;
   Vec3 radiance{0};
   std::string path;
+  float rotation = 0;   ///< degrees, as Environment takes it
+  float intensity = 1;  ///< multiplies the radiance
 };
+
+/// By what one of many lights is chosen: a tree, which knows where they are, or their power alone.
+enum class LightChoice : uint8_t { kTree, kPower };
 
 inline constexpr uint64_t kMaxEnvironmentPixels = uint64_t{1} << 26;
 
@@ -37,15 +42,16 @@ struct ShadingOptions {
   uint32_t roulette_start = 3;  ///< the first vertex at which Russian roulette may end a path
   uint64_t seed = 0;
   EnvironmentOptions environment;
+  LightChoice light_choice = LightChoice::kTree;
   EffectChoice effects;
 };
 
-/// Tables shared by all threads: light sampling distributions, environment map and its distribution, directional
-/// albedo tables. Immutable. Fails with: kInput (environment file).
+/// Tables shared by all threads: light sampling distributions or a tree over the lights (made by `threads`), environment
+/// map and its distribution, directional albedo tables. Immutable. Fails with: kInput (environment file).
 class ShadingTables {
  public:
   static Result<std::unique_ptr<ShadingTables>> create(FileSystem& fs, const Scene& scene,
-                                                       const ShadingOptions& options);
+                                                       const ShadingOptions& options, unsigned threads = 1);
   ~ShadingTables();
   uint64_t resident_bytes() const;
   bool has_lights() const;  ///< anything a shadow ray could be sent to

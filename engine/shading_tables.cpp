@@ -11,21 +11,22 @@ ShadingTables::ShadingTables(std::unique_ptr<Impl> impl) : impl_(std::move(impl)
 ShadingTables::~ShadingTables() = default;
 
 Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, const Scene& scene,
-                                                             const ShadingOptions& options) {
+                                                             const ShadingOptions& options, unsigned threads) {
   auto impl = std::make_unique<Impl>();
   switch (options.environment.kind) {
     case EnvironmentOptions::Kind::kNone:
       break;
     case EnvironmentOptions::Kind::kConstant:
-      impl->environment = Environment(options.environment.radiance);
+      impl->environment = Environment(options.environment.radiance * options.environment.intensity);
       break;
     case EnvironmentOptions::Kind::kImage: {
       SHOAL_ASSIGN_OR_RETURN(ImageF image, read_hdr_image(fs, options.environment.path, kMaxEnvironmentPixels));
-      impl->environment = Environment(std::move(image));
+      impl->environment = Environment(std::move(image), options.environment.rotation, options.environment.intensity);
       break;
     }
   }
-  impl->lights.emplace(scene, impl->environment);
+  const bool planted = options.light_choice == LightChoice::kTree;
+  impl->lights.emplace(scene, impl->environment, threads, planted ? LightSampler::kFewLights : UINT64_MAX);
   impl->lights_hit_by_chance = !impl->environment.black();
   for (const Material& material : scene.materials) {
     if ((material.flags & kMaterialEmits) != 0) impl->lights_hit_by_chance = true;

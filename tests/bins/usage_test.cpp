@@ -24,6 +24,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
       {"build", {"--output", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
+                  "--environment-rotation",    "--environment-intensity",
                   "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
                   "--tonemap", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted",
                   "--projection", "perspective, orthographic, equirectangular, fisheye", "--fov", "--ortho-height",
@@ -100,6 +101,10 @@ TEST(Usage, ValuesThatMakeNoSenseExitTwoBeforeAnythingIsRead) {
   expect({"--environment", "constant:1,2,x"}, {"is not an environment"});
   expect({"--environment", "constant:1,-2,3"}, {"is not an environment"});
   expect({"--environment", "constant:nan,0,0"}, {"is not an environment"});
+  expect({"--environment", "constant:1,1,1", "--environment-intensity", "-1"}, {"expected a number >= 0"});
+  expect({"--environment", "constant:1,1,1", "--environment-intensity", "nan"}, {"expected a number >= 0"});
+  expect({"--environment", "constant:1,1,1", "--environment-rotation", "inf"}, {"expected degrees"});
+  expect({"--environment-rotation", "90"}, {"--environment"});
   expect({"--treelet-size", "1K"}, {"treelet size of 1024 bytes", "4K to 4M"});
   expect({"--treelet-size", "8M"}, {"treelet size of 8388608 bytes", "4K to 4M"});
   expect({"--tonemap", "sepia"}, {"pbr-neutral", "sepia"});

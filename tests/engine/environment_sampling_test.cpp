@@ -83,6 +83,50 @@ TEST(Environment, TheDensityIntegratesToOneAndIsTheOneSampled) {
   EXPECT_LT(chi2, freedom + 6 * std::sqrt(2.0 * freedom));
 }
 
+TEST(Environment, ItTurnsCounterClockwiseSeenFromAbove) {
+  const auto facing = [](float u, float) { return Vec3(std::abs(u - 0.5f) < 0.1f ? 1 : 0); };
+  const auto seen = [&](float degrees, const Vec3& along) {
+    return Environment(picture(64, 32, facing), degrees).radiance(along).x;
+  };
+  EXPECT_EQ(seen(0, {0, 0, -1}), 1);
+  EXPECT_EQ(seen(90, {0, 0, -1}), 0);
+  EXPECT_EQ(seen(90, {-1, 0, 0}), 1);
+  EXPECT_EQ(seen(180, {0, 0, 1}), 1);
+  EXPECT_EQ(seen(-90, {1, 0, 0}), 1);
+  EXPECT_EQ(seen(720 + 90, {-1, 0, 0}), 1);
+  // The seam of the picture, which a turn brings to the front, is interpolated across.
+  const Environment halves(picture(8, 4, [](float u, float) { return Vec3(u < 0.5f ? 1 : 3); }), 180);
+  EXPECT_NEAR(halves.radiance({0, 0, -1}).x, 2, 1e-5);
+}
+
+TEST(Environment, ATurnedOneIsSampledWhereItIsBright) {
+  for (const float degrees : {-30.0f, 77.0f, 180.0f, 359.9f}) {
+    const Environment e(picture(48, 24, sky), degrees);
+    double inverse = 0;
+    int other_texel = 0;
+    constexpr uint32_t kSamples = 40000;
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      const Random4 r = random4(3, i, 0, 0, Dimension::kLight);
+      float pdf = 0;
+      const Vec3 d = e.sample(r.uniform(1), r.uniform(2), &pdf);
+      if (!(pdf > 0)) continue;
+      if (std::abs(e.pdf(d) / pdf - 1) > 1e-3f) ++other_texel;
+      inverse += 1 / double{pdf} / kSamples;
+    }
+    EXPECT_LT(other_texel, 40) << "at the edge of a texel rounding may take the next";
+    EXPECT_NEAR(inverse / (4 * kPi), 1, 0.05);
+  }
+}
+
+TEST(Environment, IntensityMultipliesTheRadianceAndNothingElse) {
+  const Environment one(picture(48, 24, sky)), five(picture(48, 24, sky), 0, 5);
+  const Vec3 d = glm::normalize(Vec3(0.3f, 0.5f, -0.4f));
+  EXPECT_NEAR(five.radiance(d).y / one.radiance(d).y, 5, 1e-5);
+  EXPECT_NEAR(five.mean_luminance() / one.mean_luminance(), 5, 1e-5);
+  EXPECT_NEAR(five.pdf(d) / one.pdf(d), 1, 1e-5);
+  EXPECT_FALSE(Environment(picture(4, 2, [](float, float) { return Vec3(1); }), 0, 0).sampled());
+}
+
 TEST(Environment, HostileTexelsAreTamed) {
   ImageF image{4, 2, std::vector<float>(24, 1.0f)};
   image.rgb[0] = std::numeric_limits<float>::quiet_NaN(), image.rgb[4] = -3, image.rgb[8] = 1e38f * 1e38f;

@@ -49,16 +49,24 @@ struct Lamps : ShadingScene {
   }
 };
 
-TEST(LightSampler, TheDensityOfAnEmitterIsKnownFromItsMaterialAlone) {
+/// What a sample of an emitter says of its density, by area.
+double area_pdf(const LightSample& sample, const Vec3& position) {
+  const Vec3 to_light = sample.target.point - position;
+  const double cosine = std::abs(glm::dot(sample.target_normal, sample.direction));
+  return sample.pdf * cosine / glm::dot(to_light, to_light);
+}
+
+TEST(LightSampler, ByPowerTheDensityOfAnEmitterIsKnownFromItsMaterialAlone) {
   const Lamps s;
   const Environment none;
-  const LightSampler lights(s.scene, none);
+  const LightSampler lights(s.scene, none, 1, 100);
+  ASSERT_FALSE(lights.has_tree());
   const Vec3 position(0.5f, 0, 0.25f);
   int punctual = 0, bright = 0, drawn = 0;
   constexpr int kDraws = 20000;
   for (int i = 0; i < kDraws; ++i) {
     const Random4 r = random4(1, static_cast<uint32_t>(i), 0, 0, Dimension::kLight);
-    const LightSample sample = lights.sample(position, {r.uniform(0), r.uniform(1), r.uniform(2)});
+    const LightSample sample = lights.sample(position, {}, {r.uniform(0), r.uniform(1), r.uniform(2)});
     ASSERT_GT(sample.pdf, 0);
     if (sample.delta) {
       ++punctual;
@@ -67,15 +75,36 @@ TEST(LightSampler, TheDensityOfAnEmitterIsKnownFromItsMaterialAlone) {
     ++drawn;
     const Material& material = s.scene.materials[sample.emitter->material];
     if (sample.emitter->material == 0) ++bright;
-    const Vec3 to_light = sample.target.point - position;
-    const double cosine = std::abs(glm::dot(sample.target_normal, sample.direction));
-    EXPECT_NEAR(sample.pdf * cosine / glm::dot(to_light, to_light) / lights.emitter_pdf(material), 1, 1e-4);
+    EXPECT_NEAR(area_pdf(sample, position) / lights.emitter_pdf(material, {}, {}), 1, 1e-4);
     EXPECT_LT(glm::dot(sample.target_normal, sample.direction), 0);
   }
   // Weights: area times luminance, 2 against 4.
   EXPECT_NEAR(static_cast<double>(bright) / drawn, 1.0 / 3, 0.015);
   // Powers: 2 pi * 6 for the emitters, 4 pi for the point: half of the choice by power, half evenly.
   EXPECT_NEAR(static_cast<double>(punctual) / kDraws, 0.5 * 0.25 + 0.5 * 0.5, 0.015);
+}
+
+TEST(LightSampler, ByTheTreeTheDensityOfAnEmitterIsThatOfItsSamples) {
+  const Lamps s;
+  const Environment none;
+  const LightSampler lights(s.scene, none);
+  ASSERT_TRUE(lights.has_tree());
+  const Vec3 position(0.5f, 0, 0.25f);
+  const LightReceiver receiver{position, encode_direction({0, 1, 0})};
+  int punctual = 0, bright = 0, drawn = 0;
+  for (uint32_t i = 0; i < 20000; ++i) {
+    const Random4 r = random4(1, i, 0, 0, Dimension::kLight);
+    const LightSample sample = lights.sample(position, receiver, {r.uniform(0), r.uniform(1), r.uniform(2)});
+    ASSERT_GT(sample.pdf, 0);
+    ++(sample.delta ? punctual : drawn);
+    if (sample.delta) continue;
+    const Emitter& e = *sample.emitter;
+    if (e.material == 0) ++bright;
+    const double known = lights.emitter_pdf(s.scene.materials[e.material], {e.instance, e.primitive, 0, 0}, receiver);
+    EXPECT_NEAR(area_pdf(sample, position) / known, 1, 1e-4);
+  }
+  EXPECT_GT(punctual, 100);
+  EXPECT_GT(bright, 0.8 * drawn) << "it is right above";
 }
 
 TEST(LightSampler, PointsCoverAnEmitterEvenly) {
@@ -86,7 +115,7 @@ TEST(LightSampler, PointsCoverAnEmitterEvenly) {
   int drawn = 0;
   for (uint32_t i = 0; i < 60000; ++i) {
     const Random4 r = random4(2, i, 0, 0, Dimension::kLight);
-    const LightSample sample = lights.sample({0, 0, 0}, {r.uniform(0), r.uniform(1), r.uniform(2)});
+    const LightSample sample = lights.sample({0, 0, 0}, {}, {r.uniform(0), r.uniform(1), r.uniform(2)});
     if (sample.emitter == nullptr || sample.emitter->material != 1) continue;
     const Vec3 p = sample.target.point - Vec3(5, 1, 0);
     ASSERT_TRUE(p.x >= 0 && p.x <= 2 && p.z >= 0 && p.z <= 2 && p.y == 0);
@@ -104,7 +133,8 @@ TEST(LightSampler, LightsWithoutAnythingToGiveAreNeverChosen) {
   const Environment none;
   const LightSampler lights(s.scene, none);
   EXPECT_TRUE(lights.empty());
-  EXPECT_EQ(lights.emitter_pdf(s.scene.materials[0]), 0);
+  EXPECT_FALSE(lights.has_tree());
+  EXPECT_EQ(lights.emitter_pdf(s.scene.materials[0], {0, s.scene.emitters[0].primitive, 0, 0}, {}), 0);
 }
 
 }  // namespace
