@@ -95,6 +95,9 @@ Result<EnvironmentOptions> chosen_environment(const RenderArguments& arguments) 
   SHOAL_ASSIGN_OR_RETURN(EnvironmentOptions chosen, parse_environment(arguments.environment));
   chosen.rotation = arguments.picture.shading.environment.rotation;
   chosen.intensity = arguments.picture.shading.environment.intensity;
+  if (arguments.environment.empty() && (chosen.rotation != 0 || chosen.intensity != 1)) {
+    return Error{ErrorCode::kUsage, "--environment-rotation and --environment-intensity need --environment"};
+  }
   if (!std::isfinite(chosen.rotation)) {
     return Error{ErrorCode::kUsage, fmt::format("--environment-rotation {}: expected degrees", chosen.rotation)};
   }
@@ -217,15 +220,13 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   declare_lens(app, picture);
   declare_pose(app, pose);
-  CLI::Option* sky = app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
+  app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
   app.add_option("--environment-rotation", picture.shading.environment.rotation,
                  "degrees by which the environment is turned, counter-clockwise seen from above")
-      ->capture_default_str()
-      ->needs(sky);
+      ->capture_default_str();
   app.add_option("--environment-intensity", picture.shading.environment.intensity,
                  "what its radiance is multiplied by")
-      ->capture_default_str()
-      ->needs(sky);
+      ->capture_default_str();
   static const std::map<std::string, LightChoice> kLightChoices{{"tree", LightChoice::kTree},
                                                                 {"power", LightChoice::kPower}};
   add_choice(app, "--light-choice", picture.shading.light_choice, kLightChoices,
