@@ -115,10 +115,7 @@ class TableChecker {
   }
 
   const char* layers(const MaterialLayers& l) const {
-    for (const TextureSlot& s :
-         {l.transmission_texture, l.clearcoat_texture, l.clearcoat_roughness_texture, l.clearcoat_normal_texture,
-          l.sheen_color_texture, l.sheen_roughness_texture, l.anisotropy_texture, l.iridescence_texture,
-          l.film_texture, l.diffuse_transmission_texture, l.diffuse_transmission_color_texture}) {
+    for (const TextureSlot& s : texture_slots(l)) {
       if (const char* expected = slot(s)) return expected;
     }
     for (const float v : {l.transmission, l.clearcoat, l.clearcoat_roughness, l.sheen_color[0], l.sheen_color[1],

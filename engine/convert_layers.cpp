@@ -110,10 +110,7 @@ Status plan_layers(SlotPlanner& slots, const gltf::Material& in, MaterialPlan& p
 }
 
 bool has_transform(const MaterialLayers& l) {
-  for (const TextureSlot& s :
-       {l.transmission_texture, l.clearcoat_texture, l.clearcoat_roughness_texture, l.clearcoat_normal_texture,
-        l.sheen_color_texture, l.sheen_roughness_texture, l.anisotropy_texture, l.iridescence_texture,
-        l.film_texture, l.diffuse_transmission_texture, l.diffuse_transmission_color_texture}) {
+  for (const TextureSlot& s : texture_slots(l)) {
     if (s.transform != 0) return true;
   }
   return false;

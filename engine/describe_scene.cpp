@@ -143,12 +143,7 @@ std::string scene_description_json(const Scene& scene) {
                {"bounds_hi", h.bounds_hi},
                {"names", parsed(scene.names)},
                {"build", parsed(scene.build_record)}};
-  Json effects = Json::array();
-  for (const EffectState& e : effects_plan(scene, {})) {
-    effects.push_back({{"name", e.name}, {"extension", e.extension}, {"on", e.on},
-                       {"materials_count", e.materials_count}, {"first_material", e.first_material}});
-  }
-  json["effects"] = effects;
+  json["effects"] = Json::parse(effects_plan_json(effects_plan(scene, {})));
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -1,5 +1,5 @@
-// The effects plan: every effect that a material can call for, whether the scene calls for it, by how many materials,
-// which is the first by name; and the choice of a user to force one off or on. What no material calls for is not
+// The effects plan: every effect that a scene can call for, whether it does, how many of its materials, lights or
+// instances do, which is the first by name; and the choice of a user to force an effect of materials off or on. What no material calls for is not
 // looked up, not evaluated and has no table. Called by bins, engine/shade and engine/describe_scene.
 // Forcing an effect on changes no bit of the picture: it runs with values that do nothing where a material does not
 // call for it. Cost: one pass over the materials.
@@ -30,9 +30,10 @@ std::string effects_text(const EffectChoice& choice);
 struct EffectState {
   std::string_view name;         ///< as --effects has it
   std::string_view extension;    ///< of glTF, or "glTF 2.0"
-  uint32_t bit = 0;              ///< of MaterialEffects; 0: a part of every material, which cannot be forced
-  uint64_t materials_count = 0;  ///< that call for it
-  std::string first_material;    ///< the first of these by name
+  uint32_t bit = 0;              ///< of MaterialEffects; 0: cannot be forced
+  std::string_view caller;       ///< what calls for it: "material", "light", "instance"
+  uint64_t callers_count = 0;
+  std::string first_caller{};    ///< the first of these by name; empty where they have none
   bool on = false;               ///< simulated
   bool forced = false;
 };
@@ -43,5 +44,7 @@ std::vector<EffectState> effects_plan(const Scene& scene, const EffectChoice& ch
 uint32_t effects_called_for(const Scene& scene, const EffectChoice& choice);
 /// A line an effect: name, on or off, and why.
 std::string effects_plan_text(const std::vector<EffectState>& plan);
+/// The same as a JSON array.
+std::string effects_plan_json(const std::vector<EffectState>& plan);
 
 }  // namespace shoal

@@ -28,7 +28,7 @@ float unit(float v) { return glm::clamp(v, 0.0f, 1.0f); }
 Vec3 vector3(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 
 void read_coat(const MaterialLayers& l, const Surface& surface, bool normal_mapped, LayerReader& reader,
-TextureContext& context, LayeredSample& out) {
+               TextureContext& context, LayeredSample& out) {
   out.clearcoat = unit(l.clearcoat * reader.texel(l.clearcoat_texture).x);
   out.clearcoat_roughness = unit(l.clearcoat_roughness * reader.texel(l.clearcoat_roughness_texture).y);
   // Without a map of its own the coat has the normal of the vertices, whatever lies below (the extension).
@@ -76,9 +76,7 @@ Status sample_layers(const MaterialLayers& l, const Material& material, uint32_t
     const Vec4 color = reader.texel(l.diffuse_transmission_color_texture);
     out.diffuse_transmission_color = vector3(l.diffuse_transmission_color) * Vec3(color);
   }
-  if (calls(kEffectClearcoat)) {
-    read_coat(l, surface, calls(kEffectNormalMap), reader, context, out);
-  }
+  if (calls(kEffectClearcoat)) read_coat(l, surface, calls(kEffectNormalMap), reader, context, out);
   if (calls(kEffectSheen)) {
     out.sheen_color = vector3(l.sheen_color) * Vec3(reader.texel(l.sheen_color_texture));
     out.sheen_roughness = unit(l.sheen_roughness * reader.texel(l.sheen_roughness_texture).w);

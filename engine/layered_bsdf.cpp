@@ -7,11 +7,8 @@ namespace {
 
 constexpr float kInversePi = 0.31830988618379067f;
 constexpr float kCoatF0 = 0.04f;  ///< KHR_materials_clearcoat: an index of 1.5
-/// Nearer to 1 than this an index bends no light: half vectors of rounded directions would be noise.
-constexpr float kLeastBending = 1e-3f;
 
 float to_alpha(float roughness) { return std::clamp(roughness * roughness, kMinAlpha, 1.0f); }
-bool bends(float ior) { return std::abs(ior - 1) >= kLeastBending; }
 
 /// (D, Lambda) of reflection by a half vector, as in Bsdf: value F d / (1 + Lo + Li), density d / (1 + Lo).
 template <class Distribution>
@@ -68,7 +65,7 @@ float LayeredBsdf::set_specular(const LayeredSample& material, const LobeTables&
   if (anisotropic_) stretched_ = anisotropic_ggx(ggx_.alpha, material.anisotropy);
   lambda_o_ = anisotropic_ ? stretched_.lambda(wo_) : ggx_.lambda(wo_);
 
-  const SpecularAlbedo e = anisotropic_ ? tables.anisotropy->albedo(wo_, ggx_.alpha, material.anisotropy)
+  const SpecularAlbedo e = anisotropic_ ? tables.anisotropy->albedo(wo_, stretched_)
                                         : tables.energy->albedo(std::min(wo_.z, 1.0f), ggx_.alpha);
   const float lost = std::max(0.0f, 1 - e.total()) / e.total();
   const Vec3 f0_dielectric = film_f0(
@@ -76,7 +73,7 @@ float LayeredBsdf::set_specular(const LayeredSample& material, const LobeTables&
       material.specular);
   const Vec3 f0_metal = film_f0(material, material.base_color, 1);
   const Vec3 gain_dielectric = 1.0f + f0_dielectric * lost, gain_metal = 1.0f + f0_metal * lost;
-  const bool glass = material.volume && material.transmission > 0 && bends(material.ior);
+  const bool glass = material.volume && material.transmission > 0 && bends_light(material.ior);
   const float dielectric = glass ? (1 - m) * (1 - material.transmission) : 1 - m;
   f0_ = dielectric * f0_dielectric * gain_dielectric + m * f0_metal * gain_metal;
   f90_ = dielectric * material.specular * gain_dielectric + m * gain_metal;
@@ -102,7 +99,7 @@ void LayeredBsdf::set_glass(const LayeredSample& m, const LobeTables& tables, co
 }
 
 void LayeredBsdf::set_inner(const LayeredSample& m, const LobeTables& tables, float rest) {
-  const bool glass = m.volume && bends(m.ior);
+  const bool glass = m.volume && bends_light(m.ior);
   const float passes = m.transmission, dielectric = 1 - m.metallic;
   if (passes > 0) {
     if (glass && glass_weight_ == 0) set_glass(m, tables, Vec3(0), 0);  // no specular lobe: everything goes through
@@ -195,7 +192,7 @@ void LayeredBsdf::add_coat(const Vec3& world_wi, BsdfValue& sum) const {
 
 void LayeredBsdf::add_sheen(const Vec3& wi, BsdfValue& sum) const {
   sum.value += sheen_ * fibres_.value(wo_, wi);
-  sum.pdf += probability_[kSheenLobe] * (0.5f * kInversePi);
+  sum.pdf += probability_[kSheenLobe] * (0.25f * kInversePi / std::sqrt(wi.z));
 }
 
 void LayeredBsdf::add_thin(const Vec3& wi, BsdfValue& sum) const {
@@ -287,7 +284,9 @@ Vec3 LayeredBsdf::sample_glass(float u_choice, float u1, float u2) const {
 
 LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2) const {
   const auto reflect = [](const Vec3& wo, const Vec3& h) { return glm::normalize(2 * glm::dot(wo, h) * h - wo); };
-  const auto on_side = [&](const Vec3& wi, bool there) { return there ? Direction{wi, frame_.to_world(wi)} : Direction{}; };
+  const auto on_side = [&](const Vec3& wi, bool there) {
+    return there ? Direction{wi, frame_.to_world(wi)} : Direction{};
+  };
   if (u_lobe < probability_[kSpecular]) {
     const Vec3 wi = reflect(wo_, anisotropic_ ? stretched_.sample_visible_normal(wo_, u1, u2)
                                               : ggx_.sample_visible_normal(wo_, u1, u2));
@@ -309,7 +308,7 @@ LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2
     }
     case kSheenLobe: {
       const SinCos phi = sin_cos(2 * kPi * u2);
-      const float z = 1 - u1, sine = std::sqrt(std::max(0.0f, (1 - z) * (1 + z)));
+      const float z = (1 - u1) * (1 - u1), sine = std::sqrt((1 - z) * (1 + z));  // denser where fibres reflect
       return on_side({sine * phi.cos, sine * phi.sin, z}, z > 0);
     }
     case kDiffuseBelow: {

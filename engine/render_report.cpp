@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "engine/camera.h"
+#include "engine/effects.h"
 #include "engine/process_memory.h"
 
 namespace shoal {
@@ -210,6 +211,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
                    {"instances_count", scene.top_tree.instance_count()},
                    {"geometry_bytes", scene.header.geometry_bytes},
                    {"resident_table_bytes", scene.resident_bytes()}};
+  json["effects"] = Json::parse(effects_plan_json(effects_plan(scene, picture.shading.effects)));
   json["memory"] = plan_json(result.plan);
   json["memory"]["peak_cache_bytes"] = result.peak_cache_bytes;
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();

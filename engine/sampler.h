@@ -10,7 +10,15 @@
 namespace shoal {
 
 /// Each dimension names four numbers in [0, 1).
-enum class Dimension : uint32_t { kPixel = 0, kLens = 1, kLight = 2, kBsdf = 3, kRoulette = 4, kCoverage = 5, kWavelength = 6 };
+enum class Dimension : uint32_t {
+  kPixel = 0,
+  kLens = 1,
+  kLight = 2,
+  kBsdf = 3,
+  kRoulette = 4,
+  kCoverage = 5,
+  kWavelength = 6
+};
 
 struct Random4 {
   uint32_t bits[4];

@@ -2,6 +2,7 @@
 // (little-endian, docs/file_format.md). Written by engine/build_scene, read and checked by engine/open_scene.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "io/page_file.h"
@@ -126,6 +127,12 @@ struct MaterialLayers {
   uint32_t reserved = 0;
 };
 static_assert(sizeof(MaterialLayers) == 192);
+
+inline std::array<TextureSlot, 11> texture_slots(const MaterialLayers& l) {
+  return {l.transmission_texture, l.clearcoat_texture, l.clearcoat_roughness_texture, l.clearcoat_normal_texture,
+          l.sheen_color_texture, l.sheen_roughness_texture, l.anisotropy_texture, l.iridescence_texture,
+          l.film_texture, l.diffuse_transmission_texture, l.diffuse_transmission_color_texture};
+}
 
 inline constexpr uint32_t kTextureTileTexels = 64;  ///< a tile is 64 x 64 RGBA8: 16 KiB decoded
 inline constexpr uint32_t kMaxTextureLevels = 17;   ///< 65536 texels a side

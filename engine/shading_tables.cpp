@@ -1,9 +1,29 @@
 #include "engine/shading_tables.h"
 
+#include "engine/dispersion.h"
+
 namespace shoal {
 namespace {
 
 bool has_specular_lobe(const Material& material) { return material.metallic > 0 || material.specular > 0; }
+
+/// The indices of refraction of the volumes that light is refracted into, as they are shaded.
+std::vector<float> glass_indices(const Scene& scene, const EffectChoice& choice) {
+  std::vector<float> indices;
+  for (const Material& material : scene.materials) {
+    const uint32_t effects = choice.of(material.effects);
+    const bool refracts = (effects & kEffectTransmission) != 0 && (effects & kEffectVolume) != 0;
+    if (!refracts || (material.effects & kLayerEffects) == 0) continue;
+    const MaterialLayers& layers = scene.material_layers[material.layers];
+    if (layers.volume == 0) continue;
+    indices.push_back(layers.ior);
+    if ((effects & kEffectDispersion) == 0 || !(layers.dispersion > 0)) continue;
+    for (const float wave : {kShortestWave, kLongestWave}) {
+      indices.push_back(dispersed_ior(layers.ior, layers.dispersion, wave));
+    }
+  }
+  return indices;
+}
 
 }  // namespace
 
@@ -36,7 +56,9 @@ Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, con
   }
   const uint32_t called = effects_called_for(scene, options.effects);
   if ((called & kLayerEffects) != 0 && !impl->energy) impl->energy.emplace();
-  if ((called & kEffectVolume) != 0 && (called & kEffectTransmission) != 0) impl->glass.emplace();
+  if (std::vector<float> indices = glass_indices(scene, options.effects); !indices.empty()) {
+    impl->glass.emplace(std::move(indices));
+  }
   if ((called & kEffectSheen) != 0) impl->sheen.emplace();
   if ((called & kEffectAnisotropy) != 0) impl->anisotropy.emplace();
   return std::unique_ptr<ShadingTables>(new ShadingTables(std::move(impl)));

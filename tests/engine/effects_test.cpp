@@ -109,15 +109,41 @@ TEST(Effects, ThePlanSaysWhatIsOnHowManyMaterialsCallForItAndWhichIsFirst) {
     return EffectState{};
   };
   EXPECT_TRUE(state("", "sheen").on);
-  EXPECT_EQ(state("", "sheen").materials_count, 1u);
-  EXPECT_EQ(state("", "sheen").first_material, "velvet");
+  EXPECT_EQ(state("", "sheen").callers_count, 1u);
+  EXPECT_EQ(state("", "sheen").first_caller, "velvet");
   EXPECT_TRUE(state("", "emission").on);
   EXPECT_FALSE(state("", "clearcoat").on);
   EXPECT_TRUE(state("+clearcoat", "clearcoat").on && state("+clearcoat", "clearcoat").forced);
   EXPECT_FALSE(state("-sheen", "sheen").on);
+  EXPECT_FALSE(state("", "textures").on) << "no material that is used has one";
+  EXPECT_FALSE(state("", "punctual-lights").on);
+  EXPECT_FALSE(state("", "instance-transforms").on);
   const std::string text = effects_plan_text(effects_plan(scene.value(), {}));
   EXPECT_NE(text.find("sheen                 on   1 material, first \"velvet\""), std::string::npos) << text;
   EXPECT_NE(text.find("clearcoat             off  no material calls for it"), std::string::npos) << text;
+}
+
+TEST(Effects, ThePlanCountsTexturesLightsAndInstances) {
+  CubeScene cube(Json{{"name", "wood"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  Json& root = cube.scene.json;
+  root["extensionsUsed"].push_back("KHR_lights_punctual");
+  root["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}, {"name", "bulb"}}};
+  for (const float x : {0.0f, 3.0f}) {
+    cube.scene.add_node({{"mesh", 0}, {"translation", {x, 0, 1}}});
+    cube.scene.add_node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  }
+  cube.scene.save(cube.fs);
+  ASSERT_TRUE(build_scene(cube.fs, "scene.gltf", "scene.shoal", {}).ok());
+  const auto scene = open_scene(cube.fs, "scene.shoal", ReadMode::kBuffered, {});
+  ASSERT_TRUE(scene.ok());
+  const std::string text = effects_plan_text(effects_plan(scene.value(), {}));
+  EXPECT_NE(text.find("textures              on   1 material, first \"wood\""), std::string::npos) << text;
+  EXPECT_NE(text.find("punctual-lights       on   2 lights, first \"bulb\""), std::string::npos) << text;
+  EXPECT_NE(text.find("instance-transforms   on   "), std::string::npos) << text;
+  const Json list = Json::parse(effects_plan_json(effects_plan(scene.value(), {})));
+  EXPECT_EQ(list.size(), effects_plan(scene.value(), {}).size());
+  EXPECT_EQ(list[3]["name"], "textures");
+  EXPECT_EQ(list[3]["callers_count"], 1);
 }
 
 TEST(Effects, TheChoiceIsReadFromLeftToRightAndWrongNamesAreRefused) {

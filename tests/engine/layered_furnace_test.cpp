@@ -20,31 +20,33 @@ Vec3 view(float mu, float phi = 0.6f) {
   return {sine * std::cos(phi), sine * std::sin(phi), mu};
 }
 
-/// Mean weight of draws along a sequence that fills the cube evenly (Roberts 2018, "R3"): what the surface sends
-/// out of what comes from wo. Error about 0.2 % of 1.
-Vec3 albedo(const LayeredSample& m, float mu, float phi = 0.6f, uint32_t draws = 8192) {
-  constexpr double kRoot = 1.2207440846057596;  // x^4 = x + 1
+/// Mean weight of draws, one in each cell of the cube of random numbers: what the surface sends out of what comes from
+/// wo. Error about 0.1 % of 1.
+Vec3 albedo(const LayeredSample& m, float mu, float phi = 0.6f) {
+  constexpr uint32_t kCells = 40;
   const LayeredBsdf bsdf(m, lobe_tables(), kUp, kUp, view(mu, phi));
   glm::dvec3 sum(0);
-  for (uint32_t i = 0; i < draws; ++i) {
-    float u[3];
-    double step = 1;
-    for (float& v : u) {
-      step /= kRoot;
-      v = std::min(static_cast<float>(std::fmod(0.5 + (i + 1) * step, 1.0)), 0x1.fffffep-1f);
-    }
-    sum += glm::dvec3(bsdf.sample(u[0], u[1], u[2]).weight);
+  for (uint32_t i = 0; i < kCells * kCells * kCells; ++i) {
+    const Random4 r = random4(17, i, 0, 0, Dimension::kBsdf);
+    const auto in_cell = [](uint32_t cell, float u) {
+      return std::min((static_cast<float>(cell) + u) / static_cast<float>(kCells), 0x1.fffffep-1f);
+    };
+    sum += glm::dvec3(bsdf.sample(in_cell(i % kCells, r.uniform(0)), in_cell(i / kCells % kCells, r.uniform(1)),
+                                  in_cell(i / (kCells * kCells), r.uniform(2)))
+                          .weight);
   }
-  return Vec3(sum / static_cast<double>(draws));
+  return Vec3(sum / static_cast<double>(kCells * kCells * kCells));
 }
 
 constexpr float kAngles[] = {0.06f, 0.3f, 0.7f, 0.98f};
+/// Of the mean of the draws (0.1 %) and of tables that are read between their nodes (0.4 %).
+constexpr float kError = 0.005f;
 
 TEST(LayeredFurnace, NothingGainsEnergyAtAnyRoughnessIndexAndAngle) {
   for (const float roughness : {0.05f, 0.3f, 0.6f, 0.85f, 1.0f}) {
     for (const LayeredCase& c : layered_cases(roughness)) {
       for (const float mu : kAngles) {
-        EXPECT_LE(max_component(albedo(c.material, mu)), 1.02f)  // tables are read between their nodes
+        EXPECT_LE(max_component(albedo(c.material, mu)), 1 + kError)
             << c.name << ", roughness " << roughness << ", mu " << mu;
       }
     }
@@ -56,8 +58,7 @@ TEST(LayeredFurnace, WhiteGlassKeepsEverythingAtAnyRoughnessIndexAndAngle) {
     for (const float ior : {1.1f, 1.33f, 1.5f, 2.4f}) {
       for (const bool outside : {true, false}) {
         for (const float mu : kAngles) {
-          // The table is read between its nodes: what bends little loses fastest where it grazes.
-          EXPECT_NEAR(albedo(white_glass(roughness, ior, outside), mu).x, 1, mu < 0.1f ? 0.02 : 0.012)
+          EXPECT_NEAR(albedo(white_glass(roughness, ior, outside), mu).x, 1, kError)
               << "roughness " << roughness << ", index " << ior << (outside ? "" : ", inside") << ", mu " << mu;
         }
       }
@@ -70,16 +71,16 @@ TEST(LayeredFurnace, SingleLobesWithCompensationLoseLessThanHalfAPercent) {
     for (const float mu : kAngles) {
       LayeredSample thin = white_plastic(roughness), paper = thin, brushed = white_metal(roughness);
       thin.transmission = 1;
-      EXPECT_NEAR(albedo(thin, mu).x, 1, 0.005) << "thin, roughness " << roughness << ", mu " << mu;
+      EXPECT_NEAR(albedo(thin, mu).x, 1, kError) << "thin, roughness " << roughness << ", mu " << mu;
       paper.diffuse_transmission = 1;
-      EXPECT_NEAR(albedo(paper, mu).x, 1, 0.005) << "paper, roughness " << roughness << ", mu " << mu;
+      EXPECT_NEAR(albedo(paper, mu).x, 1, kError) << "paper, roughness " << roughness << ", mu " << mu;
       LayeredSample coated = white_metal(0.5f);
       coated.clearcoat = 1, coated.clearcoat_roughness = roughness;
-      EXPECT_NEAR(albedo(coated, mu).x, 1, 0.005) << "coat, roughness " << roughness << ", mu " << mu;
+      EXPECT_NEAR(albedo(coated, mu).x, 1, kError) << "coat, roughness " << roughness << ", mu " << mu;
       for (const float strength : {0.4f, 1.0f}) {
         for (const float phi : {0.1f, 0.8f, 1.5f}) {
           brushed.anisotropy = strength;
-          EXPECT_NEAR(albedo(brushed, mu, phi).x, 1, mu < 0.1f ? 0.02 : 0.008)
+          EXPECT_NEAR(albedo(brushed, mu, phi).x, 1, kError)
               << "brushed " << strength << ", roughness " << roughness << ", mu " << mu << ", phi " << phi;
         }
       }
@@ -92,7 +93,7 @@ TEST(LayeredFurnace, SheenTakesFromBelowWhatItReflects) {
     for (const float mu : kAngles) {
       LayeredSample velvet = white_plastic(0.8f);
       velvet.sheen_color = Vec3(1), velvet.sheen_roughness = roughness;
-      EXPECT_NEAR(albedo(velvet, mu, 0.6f, 32768).x, 1, mu < 0.1f ? 0.02 : 0.012) << "roughness " << roughness << ", mu " << mu;
+      EXPECT_NEAR(albedo(velvet, mu).x, 1, kError) << "roughness " << roughness << ", mu " << mu;
     }
   }
 }
@@ -101,20 +102,36 @@ TEST(LayeredFurnace, TheTablesAgreeWithFineIntegrals) {
   for (const float alpha : {0.001f, 0.02f, 0.15f, 0.5f, 0.9f}) {
     for (const float mu : {0.06f, 0.2f, 0.55f, 0.97f}) {
       for (const float eta : {1.05f, 1.4f, 2.2f, 1 / 1.2f, 1 / 1.5f, 1 / 2.4f}) {
-        const GlassAlbedo fine = integrate_glass_albedo(mu, alpha, eta, 120);
+        const GlassAlbedo fine = integrate_glass_albedo(mu, alpha, eta, 20000);
         const GlassAlbedo found = lobe_tables().glass->albedo(mu, alpha, eta);
-        EXPECT_NEAR(found.sum(0.04f, 1), fine.sum(0.04f, 1), 0.008) << alpha << " " << mu << " " << eta;
+        EXPECT_NEAR(found.sum(0.04f, 1), fine.sum(0.04f, 1), 0.003) << alpha << " " << mu << " " << eta;
       }
       for (const float phi : {0.2f, 0.9f}) {
         for (const float strength : {0.3f, 0.77f}) {
-          const SpecularAlbedo fine = integrate_anisotropic_albedo(view(mu, phi), alpha, strength, 100);
-          const SpecularAlbedo found = lobe_tables().anisotropy->albedo(view(mu, phi), alpha, strength);
-          EXPECT_NEAR(found.total(), fine.total(), 0.01) << alpha << " " << mu << " " << phi << " " << strength;
+          const GgxAnisotropic ggx = anisotropic_ggx(alpha, strength);
+          const SpecularAlbedo fine = integrate_anisotropic_albedo(view(mu, phi), ggx, 20000);
+          const SpecularAlbedo found = lobe_tables().anisotropy->albedo(view(mu, phi), ggx);
+          EXPECT_NEAR(found.total(), fine.total(), 0.004) << alpha << " " << mu << " " << phi << " " << strength;
         }
       }
       const float fibre = std::max(alpha, kMinSheenAlpha);
-      EXPECT_NEAR(lobe_tables().sheen->albedo(mu, fibre), integrate_sheen_albedo(mu, fibre, 300), 0.01)
+      EXPECT_NEAR(lobe_tables().sheen->albedo(mu, fibre), integrate_sheen_albedo(mu, fibre, 300), 0.002)
           << fibre << " " << mu;
+    }
+  }
+}
+
+TEST(LayeredFurnace, AGlassTableOfManyIndicesIsReadBetweenThem) {
+  std::vector<float> indices;
+  for (int i = 0; i < 40; ++i) indices.push_back(1.02f + 0.04f * static_cast<float>(i));
+  const GlassTable many(indices);
+  EXPECT_LT(many.resident_bytes(), 2u << 20);
+  for (const float ior : {1.02f, 1.3f, 1.5f, 2.58f}) {
+    for (const float eta : {ior, 1 / ior}) {
+      for (const float alpha : {0.05f, 0.5f}) {
+        const GlassAlbedo fine = integrate_glass_albedo(0.4f, alpha, eta, 20000);
+        EXPECT_NEAR(many.albedo(0.4f, alpha, eta).sum(0.04f, 1), fine.sum(0.04f, 1), 0.01) << alpha << " " << eta;
+      }
     }
   }
 }

@@ -12,7 +12,7 @@ namespace shoal::testing {
 
 inline const LobeTables& lobe_tables() {
   static const EnergyTable energy;
-  static const GlassTable glass;
+  static const GlassTable glass({1.05f, 1.1f, 1.2f, 1.33f, 1.4f, 1.5f, 2.2f, 2.4f});
   static const SheenTable sheen;
   static const AnisotropyTable anisotropy;
   static const LobeTables tables{&energy, &glass, &sheen, &anisotropy};
@@ -70,8 +70,16 @@ inline std::vector<LayeredCase> layered_cases(float roughness) {
   add("coated metal", m);
   m.clearcoat_normal = glm::normalize(Vec3(0.3f, 0.2f, 1));
   add("coat with a normal of its own", m);
+  m = white_plastic(roughness), m.anisotropy = 0.6f;
+  add("brushed plastic", m);
+  m = white_glass(0.4f, 1.5f, true), m.clearcoat = 1, m.clearcoat_roughness = roughness;
+  add("coated glass", m);
   m = white_plastic(0.8f), m.sheen_color = Vec3(1), m.sheen_roughness = roughness;
   add("velvet", m);
+  m.diffuse_transmission = 0.6f, m.clearcoat = 0.5f, m.clearcoat_roughness = 0.3f;
+  add("coated velvet curtain", m);
+  m = white_glass(roughness, 1.5f, true), m.iridescence = 1, m.film_thickness = 420;
+  add("soapy glass", m);
   m = white_plastic(roughness), m.iridescence = 1, m.film_thickness = 350, m.base_color = Vec3(1);
   add("soap", m);
   m = white_metal(roughness), m.iridescence = 1, m.film_thickness = 500, m.base_color = {0.9f, 0.6f, 0.3f};
