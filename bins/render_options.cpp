@@ -237,6 +237,11 @@ void RenderArguments::declare(CLI::App& app) {
                  "force effects of materials off or on: -NAME or +NAME, separated by commas (--effects=-sheen), all, "
                  "-all; `shoal info` lists them. On changes no picture")
       ->type_name("LIST");
+  static const std::map<std::string, TextureFilter> kFilters{{"mip", TextureFilter::kMip},
+                                                             {"bilinear", TextureFilter::kBilinear}};
+  add_choice(app, "--texture-filter", picture.shading.texture_filter, kFilters,
+             ": textures by the width of the ray (default), or always at their finest")
+      ->type_name("WAY");
   app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   app.add_option("--max-memory", max_memory, kMaxMemoryHelp);
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")

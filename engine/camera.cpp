@@ -103,6 +103,16 @@ CameraRay Camera::fisheye_ray(float u, float v) const {
   return {camera_to_world_.translation, glm::normalize(camera_to_world_.vector({x * out, y * out, -angle.cos}))};
 }
 
+RayCone Camera::cone() const {
+  const auto rows = static_cast<float>(height_);
+  switch (projection_) {
+    case Projection::kOrthographic: return {2 * scale_y_ / rows * kConePixelShare, 0};
+    case Projection::kEquirectangular: return {0, kPi / rows * kConePixelShare};
+    case Projection::kFisheye: return {0, 2 * half_fov_ / static_cast<float>(std::min(width_, height_)) * kConePixelShare};
+    default: return {0, 2 * scale_y_ / rows * kConePixelShare};
+  }
+}
+
 CameraRecord frame_camera(const Bounds3& bounds) {
   constexpr float kHalfAngle = 25 * kPi / 180;
   const bool usable = !bounds.empty() && std::isfinite(glm::length(bounds.extent()));

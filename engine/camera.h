@@ -2,6 +2,7 @@
 #pragma once
 
 #include "engine/lens.h"
+#include "engine/ray_cone.h"
 #include "engine/sampler.h"
 #include "engine/scene.h"
 
@@ -22,6 +23,8 @@ class Camera {
   /// Box filter one pixel wide: the point is uniform in the pixel. Pixel rows run from the top. `lens` is for the point
   /// on the aperture.
   CameraRay ray(uint32_t x, uint32_t y, const Random4& random, const Random4& lens = {}) const;
+  /// Of the ray of one sample, in the middle of the picture; without what an aperture blurs.
+  RayCone cone() const;
 
  private:
   CameraRay flat_ray(float u, float v, const Random4& lens) const;

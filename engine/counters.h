@@ -38,6 +38,7 @@ namespace shoal {
     "bytes of path states touched: at birth, at the end of each ray, at shading and at the end")              \
   X(vertices_shaded_count, "vertices", "path vertices shaded")                                                \
   X(texture_lookups_count, "lookups", "texture look-ups")                                                     \
+  X(texture_tiles_pinned_count, "tiles", "changes from a texture tile to another, a thread at a time")         \
   X(coverage_tests_count, "tests", "alpha coverage tests in traversal")                                       \
   X(invalid_samples_count, "samples", "contributions that were not finite: dropped")                          \
   X(film_saturated_count, "samples", "contributions too large for the film: clamped")

@@ -6,9 +6,11 @@ Result<Vec4> TextureContext::sample(const TextureSlot& slot, const Vec2& uv) {
   if (slot.texture == kNoIndex) return Vec4(1);
   ++lookups_count;
   const float* m = transform(slot);
-  if (m == nullptr) return textures.sample(slot.texture, uv, cache_counters);
+  const uint32_t level =
+      footprint == nullptr ? 0 : footprint->level(textures.texture(slot.texture), slot.uv_set, m);
+  if (m == nullptr) return textures.sample(slot.texture, uv, level, cache_counters);
   const Vec2 moved(m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]);
-  return textures.sample(slot.texture, moved, cache_counters);
+  return textures.sample(slot.texture, moved, level, cache_counters);
 }
 
 Result<Vec3> sample_emission(const Material& material, const Vec2& uv, TextureContext& context) {

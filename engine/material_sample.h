@@ -1,6 +1,6 @@
 // A material at a point of a surface: its factors times its textures and the vertex colour. A material without
-// textures touches none, and only what it calls for is looked up. Called by engine/shade. One texture tile is pinned
-// at a time (engine/texture_sample.h).
+// textures touches none, and only what it calls for is looked up. Called by engine/shade. A few texture tiles
+// stay pinned (engine/texture_sample.h).
 #pragma once
 
 #include <span>
@@ -8,6 +8,7 @@
 #include "engine/layered_bsdf.h"
 #include "engine/scene_tables.h"
 #include "engine/surface.h"
+#include "engine/texture_footprint.h"
 #include "engine/texture_sample.h"
 
 namespace shoal {
@@ -18,6 +19,7 @@ struct TextureContext {
   CacheCounters& cache_counters;
   uint64_t& lookups_count;
   std::span<const TextureTransform> transforms = {};  ///< empty: none is applied
+  const TextureFootprint* footprint = nullptr;        ///< null: level 0
 
   /// White when the slot is empty. `uv` is before the slot's transform. Fails with: what the cache returns.
   Result<Vec4> sample(const TextureSlot& slot, const Vec2& uv);

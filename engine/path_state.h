@@ -30,8 +30,9 @@ struct PathState {
   Vec3 direction{0};
   uint32_t medium = 0;               ///< PathMedium: what volume the ray travels in
   Hit hit;
+  uint32_t cone = 0;                 ///< pack_cone() of the ray; 0 without textures
 };
-static_assert(sizeof(PathState) == 112);
+static_assert(sizeof(PathState) == 116);
 
 /// PathState::medium: the material of the volume + 1, or 0 in the open; the shader's.
 enum PathMedium : uint32_t {

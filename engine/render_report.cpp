@@ -143,6 +143,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"environment_intensity", picture.shading.environment.intensity},
           {"light_choice", picture.shading.light_choice == LightChoice::kTree ? "tree" : "power"},
           {"effects", effects_text(picture.shading.effects)},
+          {"texture_filter", picture.shading.texture_filter == TextureFilter::kMip ? "mip" : "bilinear"},
           {"order", order_name(result.order.order)},
           {"order_asked", order_name(execution.order)},
           {"order_reason", result.order.reason},

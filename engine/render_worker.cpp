@@ -80,7 +80,8 @@ void run_on_threads(RenderContext& context, const std::function<void(unsigned)>&
 RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
     : context_(context),
       phases_(context.phases[thread]),
-      shader_(context.scene, context.tables, context.picture.shading, context.cache) {}
+      shader_(context.scene, context.tables, context.picture.shading, context.cache),
+      camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0) {}
 
 Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
   enter(Phase::kPaths);
@@ -101,6 +102,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   const CameraRay camera_ray = context_.camera.ray(sample.x, sample.y, in_pixel, on_lens);
   path.origin = camera_ray.origin;
   path.direction = camera_ray.direction;
+  path.cone = camera_cone_;
   path.hit = Hit{};
   path.pending.store(1, std::memory_order_relaxed);
   ++counters_.samples_started_count;
@@ -289,6 +291,7 @@ void RenderWorker::hand_in() {
   c.coverage_tests_count = trace_counters_.coverage_tests_count;
   c.vertices_shaded_count = shade_counters_.vertices_shaded_count;
   c.texture_lookups_count = shade_counters_.texture_lookups_count;
+  c.texture_tiles_pinned_count = shader_.texture_tiles_pinned_count();
   c.invalid_samples_count += shade_counters_.invalid_samples_count;
   std::lock_guard guard(context_.mutex);
   context_.counters.add(c);

@@ -137,6 +137,7 @@ class RenderWorker {
   RenderContext& context_;
   PhaseClock& phases_;
   Shader shader_;
+  uint32_t camera_cone_;  ///< PathState::cone of a path that begins
   PagePin geometry_, attributes_;
   TreeletId in_hand_ = kNoIndex;
   TreeletId attributes_of_ = kNoIndex;

@@ -17,7 +17,8 @@ enum class Dimension : uint32_t {
   kBsdf = 3,
   kRoulette = 4,
   kCoverage = 5,
-  kWavelength = 6
+  kWavelength = 6,
+  kTexture = 7
 };
 
 struct Random4 {

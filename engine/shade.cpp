@@ -1,6 +1,7 @@
 #include "engine/shade.h"
 
 #include <cmath>
+#include <optional>
 
 #include "engine/bsdf.h"
 #include "engine/dispersion.h"
@@ -53,7 +54,11 @@ uint32_t light_side(const Surface& surface, const AnyBsdf& bsdf) {
 }  // namespace
 
 Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
-    : scene_(&scene), tables_(&tables), options_(&options), textures_(scene.textures, cache) {}
+    : scene_(&scene),
+      tables_(&tables),
+      options_(&options),
+      textures_(scene.textures, cache),
+      follows_cones_(!scene.textures.empty() && options.texture_filter == TextureFilter::kMip) {}
 
 Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
                          std::span<const std::byte> attributes, ShadeResult& result, ShadeCounters& counters,
@@ -67,25 +72,26 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   if (((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {
     absorb(path, surface, surface.attributes.material, effects);
   }
-  if ((effects & material.effects & kEffectUnlit) != 0) {
-    return add_unlit(path, surface, material, counters, cache_counters);
-  }
+  std::optional<TextureFootprint> footprint;
+  if (follows_cones_) footprint.emplace(reach(path, surface));
+  TextureContext textures = context(counters, cache_counters);
+  if (footprint) textures.footprint = &*footprint;
+  if ((effects & material.effects & kEffectUnlit) != 0) return add_unlit(path, surface, material, textures, counters);
   if ((material.flags & kMaterialEmits) != 0) {
-    SHOAL_RETURN_IF_ERROR(add_emission(path, surface, material, counters, cache_counters));
+    SHOAL_RETURN_IF_ERROR(add_emission(path, surface, material, textures, counters));
   }
   if (path.bounce >= options_->bounces) return {};
   if ((effects & kLayerEffects) != 0) {
-    return shade_layers(path, surface, material, effects, result, counters, cache_counters);
+    return shade_layers(path, surface, material, effects, result, textures, counters);
   }
 
-  TextureContext textures = context(counters, cache_counters);
   const bool mapped = (options_->effects.off & kEffectNormalMap) == 0;
   SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, textures));
   SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, textures, mapped));
   const Bsdf bsdf(values, tables_->impl().energy_table(), surface.geometric_normal, normal, surface.wo);
   if (bsdf.black()) return {};
   const Sides media{path.medium & kPathMediumMask, 0};
-  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, counters, cache_counters));
+  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
   sample_bounce(path, surface, bsdf, media, result);
   return {};
 }
@@ -96,9 +102,18 @@ TextureContext Shader::context(ShadeCounters& counters, CacheCounters& cache_cou
           moved ? std::span<const TextureTransform>(scene_->texture_transforms) : std::span<const TextureTransform>()};
 }
 
+TextureFootprint Shader::reach(PathState& path, const Surface& surface) const {
+  const RayCone cone = unpack_cone(path.cone);
+  const float width = cone.width + cone.spread * glm::length(surface.position.point - path.origin);
+  path.cone = pack_cone({width, cone.spread});
+  return {surface, width, path_random(path, options_->seed, Dimension::kTexture).uniform(0)};
+}
+
 Status Shader::add_emission(PathState& path, const Surface& surface, const Material& material,
-                            ShadeCounters& counters, CacheCounters& cache_counters) {
-  TextureContext textures = context(counters, cache_counters);
+                            const TextureContext& vertex, ShadeCounters& counters) {
+  TextureContext textures = vertex;
+  // Light samples see level 0, and the weights below are of one and the same emission.
+  if (path.bsdf_pdf > 0) textures.footprint = nullptr;
   SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
                          sample_emission(material, surface.uv(material.emissive_texture.uv_set), textures));
   float weight = 1;
@@ -117,7 +132,7 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
 
 template <class AnyBsdf>
 Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
-                            ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters) {
+                            ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters) {
   const LightSampler& lights = *tables_->impl().lights;
   if (lights.empty()) return {};
   const Random4 random = path_random(path, options_->seed, Dimension::kLight);
@@ -134,7 +149,8 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
 
   Vec3 radiance = light.radiance;
   if (light.emitter != nullptr) {
-    TextureContext textures = context(counters, cache_counters);
+    TextureContext textures = vertex;
+    textures.footprint = nullptr;  // which is of another surface
     SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
                            sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, textures));
     radiance *= emission;
@@ -180,6 +196,7 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsd
   path.throughput = throughput;
   path.bsdf_pdf = sample.pdf;
   if (tables_->impl().lights->has_tree()) path.light_side = light_side(surface, bsdf);
+  if (follows_cones_) path.cone = pack_cone(scattered_cone(unpack_cone(path.cone), sample.pdf));
   ++path.bounce;
   result.has_bounce = true;
   const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, sample.direction);
@@ -197,9 +214,8 @@ const MaterialLayers& Shader::layers_of(const Material& material) const {
   return (material.effects & kLayerEffects) != 0 ? scene_->material_layers[material.layers] : kNone;
 }
 
-Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
-                         CacheCounters& cache_counters) {
-  TextureContext textures = context(counters, cache_counters);
+Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
+                         ShadeCounters& counters) {
   SHOAL_ASSIGN_OR_RETURN(const Vec3 color, sample_base_color(material, surface, textures));
   add_radiance(path.radiance, path.throughput * color, counters);
   return {};
@@ -231,8 +247,7 @@ void Shader::disperse(const PathState& path, const MaterialLayers& layers, Layer
 }
 
 Status Shader::shade_layers(PathState& path, const Surface& surface, const Material& material, uint32_t effects,
-                            ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters) {
-  TextureContext textures = context(counters, cache_counters);
+                            ShadeResult& result, TextureContext& textures, ShadeCounters& counters) {
   const uint32_t mapped = ~options_->effects.off & kEffectNormalMap;
   LayeredSample values;
   SHOAL_ASSIGN_OR_RETURN(static_cast<MaterialSample&>(values), sample_material(material, surface, textures));
@@ -249,7 +264,7 @@ Status Shader::shade_layers(PathState& path, const Surface& surface, const Mater
   if (values.volume && (values.transmission > 0 || values.diffuse_transmission > 0)) {
     media = values.outside ? Sides{medium, inside} : Sides{inside, 0};
   }
-  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, counters, cache_counters));
+  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
   sample_bounce(path, surface, bsdf, media, result);
   return {};
 }

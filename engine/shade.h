@@ -11,13 +11,13 @@
 #include "engine/effects.h"
 #include "engine/path_state.h"
 #include "engine/scene.h"
+#include "engine/texture_footprint.h"
 #include "engine/texture_sample.h"
 #include "io/page_cache.h"
 
 namespace shoal {
 
 struct LayeredSample;
-struct Surface;
 struct TextureContext;
 
 /// --environment: constant radiance or an equirectangular picture (glTF axes: +y up; u = 0.5 looks along -z).
@@ -44,6 +44,7 @@ struct ShadingOptions {
   EnvironmentOptions environment;
   LightChoice light_choice = LightChoice::kTree;
   EffectChoice effects;
+  TextureFilter texture_filter = TextureFilter::kMip;
 };
 
 /// Tables shared by all threads: light sampling distributions or a tree over the lights (made by `threads`), environment
@@ -81,7 +82,7 @@ struct ShadeCounters {
 
 class Shader {
  public:
-  /// Keeps references to all four. `cache` serves texture tiles; at most one is pinned at a time.
+  /// Keeps references to all four. `cache` serves texture tiles; kPinnedTilesPerThread at most are pinned.
   Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache);
 
   /// Shades path.hit. Requires: path.hit.valid(), both rays of the vertex before are home. `geometry` is the hit
@@ -92,15 +93,20 @@ class Shader {
                    ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
   /// The ray left the scene: adds the environment with MIS.
   void shade_miss(PathState& path, ShadeCounters& counters);
+  /// Whether PathState::cone is wanted.
+  bool follows_cones() const { return follows_cones_; }
+  uint64_t texture_tiles_pinned_count() const { return textures_.tiles_pinned_count(); }
 
  private:
-  Status add_emission(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
-                      CacheCounters& cache_counters);
-  Status add_unlit(PathState& path, const Surface& surface, const Material& material, ShadeCounters& counters,
-                   CacheCounters& cache_counters);
+  /// Moves path.cone to the surface; what of it textures are looked up for.
+  TextureFootprint reach(PathState& path, const Surface& surface) const;
+  Status add_emission(PathState& path, const Surface& surface, const Material& material,
+                      const TextureContext& vertex, ShadeCounters& counters);
+  Status add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
+                   ShadeCounters& counters);
   /// Light and bounce of a material with layers; `effects` is what it is shaded with.
   Status shade_layers(PathState& path, const Surface& surface, const Material& material, uint32_t effects,
-                      ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
+                      ShadeResult& result, TextureContext& textures, ShadeCounters& counters);
   void disperse(const PathState& path, const MaterialLayers& layers, LayeredSample& values) const;
   /// What the volume that `medium` names lets pass over a distance.
   Vec3 transmittance(uint32_t medium, float distance) const;
@@ -111,7 +117,7 @@ class Shader {
   };
   template <class AnyBsdf>
   Status sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
-                      ShadeResult& result, ShadeCounters& counters, CacheCounters& cache_counters);
+                      ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters);
   template <class AnyBsdf>
   void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                      ShadeResult& result) const;
@@ -122,6 +128,7 @@ class Shader {
   const ShadingTables* tables_;
   const ShadingOptions* options_;
   TextureSampler textures_;
+  bool follows_cones_;
 };
 
 }  // namespace shoal

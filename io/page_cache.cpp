@@ -150,11 +150,14 @@ PageCache::~PageCache() {
 }
 
 uint64_t PageCache::minimum_capacity_bytes(const PageFile& file, unsigned threads) {
-  uint64_t largest[256] = {};
+  uint64_t largest[256] = {}, pages[256] = {};
   for (const PageRecord& record : file.records()) {
     uint64_t& bytes = largest[static_cast<uint8_t>(record.kind)];
     if (record.kind != PageKind::kTable) bytes = std::max(bytes, PageBuffers::charge_bytes(record.raw_bytes));
+    ++pages[static_cast<uint8_t>(record.kind)];
   }
+  constexpr auto kTexture = static_cast<uint8_t>(PageKind::kTexture);
+  largest[kTexture] *= std::min<uint64_t>(pages[kTexture], kPinnedTilesPerThread);
   uint64_t sum = 0;
   for (const uint64_t bytes : largest) sum += bytes;
   return sum * threads;

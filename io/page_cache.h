@@ -32,6 +32,9 @@
 
 namespace shoal {
 
+/// Texture tiles that a thread may have pinned at a time.
+inline constexpr unsigned kPinnedTilesPerThread = 8;
+
 /// Counted by the caller's thread, summed by the render (engine/counters.h names them).
 struct CacheCounters {
   uint64_t page_requests_count = 0;  ///< = hits + misses
@@ -92,14 +95,14 @@ enum class Prefetch : uint8_t {
 
 class PageCache {
  public:
-  static constexpr unsigned kMaxPinsPerThread = 3;  ///< a treelet, its attributes, a texture tile
+  static constexpr unsigned kMaxPinsPerThread = 2 + kPinnedTilesPerThread;  ///< a treelet, its attributes, tiles
 
   PageCache(const PageFile& file, uint64_t capacity_bytes, PageCheck check = {}, WaitingWork waiting = {},
             const PagingOptions& paging = {});
   ~PageCache();
 
   /// The smallest capacity with which `threads` threads always get on: the largest page of each kind, a thread,
-  /// when each pins one page of a kind at a time. Tables are not read through the cache.
+  /// when each pins one page of a kind at a time, or kPinnedTilesPerThread of textures. Tables are not read through the cache.
   static uint64_t minimum_capacity_bytes(const PageFile& file, unsigned threads);
 
   /// The capacity that holds every page of the file, tables left out: then nothing is ever evicted.

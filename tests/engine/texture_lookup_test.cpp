@@ -65,7 +65,7 @@ TEST(TextureLookup, IsBilinearUnderEveryWrapModeAndEncoding) {
       std::uniform_real_distribution<float> uniform(-2.5f, 3.5f);
       for (int i = 0; i < 3000; ++i) {
         const Vec2 uv(uniform(random), uniform(random));
-        const Result<Vec4> found = sampler.sample(index, uv, s.cache_counters);
+        const Result<Vec4> found = sampler.sample(index, uv, 0, s.cache_counters);
         ASSERT_TRUE(found.ok());
         for (uint32_t c = 0; c < 4; ++c) {
           ASSERT_NEAR(found.value()[static_cast<int>(c)], reference(texels, texture, uv.x, uv.y, c), 2e-4)
@@ -85,9 +85,9 @@ TEST(TextureLookup, TheOriginIsTheUpperLeftCornerAndNearestTakesOneTexel) {
   s.scene.textures[index].nearest = 1;
   s.prepare({});
   TextureSampler sampler(s.scene.textures, *s.cache);
-  EXPECT_EQ(sampler.sample(index, {0.001f, 0.001f}, s.cache_counters).value().x, 1);
-  EXPECT_EQ(sampler.sample(index, {0.999f, 0.999f}, s.cache_counters).value().y, 1);
-  EXPECT_EQ(sampler.sample(index, {0.999f, 0.001f}, s.cache_counters).value(), Vec4(0));
+  EXPECT_EQ(sampler.sample(index, {0.001f, 0.001f}, 0, s.cache_counters).value().x, 1);
+  EXPECT_EQ(sampler.sample(index, {0.999f, 0.999f}, 0, s.cache_counters).value().y, 1);
+  EXPECT_EQ(sampler.sample(index, {0.999f, 0.001f}, 0, s.cache_counters).value(), Vec4(0));
 }
 
 TEST(TextureLookup, CoordinatesThatAreNotFiniteAreHarmless) {
@@ -99,23 +99,30 @@ TEST(TextureLookup, CoordinatesThatAreNotFiniteAreHarmless) {
   for (const float u : {inf, -inf, nan, 3e38f, -3e38f, 1e-45f, -1e-45f, 16777217.0f}) {
     for (const WrapMode mode : {WrapMode::kRepeat, WrapMode::kMirroredRepeat, WrapMode::kClampToEdge}) {
       s.scene.textures[index].wrap_u = s.scene.textures[index].wrap_v = mode;
-      const Result<Vec4> found = sampler.sample(index, {u, u}, s.cache_counters);
+      const Result<Vec4> found = sampler.sample(index, {u, u}, 0, s.cache_counters);
       ASSERT_TRUE(found.ok());
       EXPECT_TRUE(found.value().x >= 0 && found.value().x <= 1);
     }
   }
 }
 
-TEST(TextureLookup, PinsEachTileOnceAndOnlyOneAtATime) {
+TEST(TextureLookup, KeepsAFewTilesPinnedAndNeverMore) {
   ShadingScene s = empty_scene();
-  const uint32_t index = s.add_texture(128, 128, random_texels(128, 128), false);
-  s.cache_bytes = kTextureTileTexels * kTextureTileTexels * 4;  // room for one tile
+  constexpr uint32_t kSide = 4 * kTextureTileTexels;  // 16 tiles
+  const uint32_t index = s.add_texture(kSide, kSide, random_texels(kSide, kSide), false);
+  s.cache_bytes = kPinnedTilesPerThread * kTextureTileTexels * kTextureTileTexels * 4;
   s.prepare({});
   TextureSampler sampler(s.scene.textures, *s.cache);
-  ASSERT_TRUE(sampler.sample(index, {0.5f, 0.5f}, s.cache_counters).ok());  // the corner of four tiles
+  ASSERT_TRUE(sampler.sample(index, {0.5f, 0.5f}, 0, s.cache_counters).ok());  // the corner of four tiles
   EXPECT_EQ(s.cache_counters.page_requests_count, 4);
-  ASSERT_TRUE(sampler.sample(index, {0.75f, 0.75f}, s.cache_counters).ok());
-  EXPECT_EQ(s.cache_counters.page_requests_count, 4);  // the tile pinned last
+  ASSERT_TRUE(sampler.sample(index, {0.7f, 0.7f}, 0, s.cache_counters).ok());
+  EXPECT_EQ(s.cache_counters.page_requests_count, 4);  // of the tiles pinned before
+  EXPECT_EQ(sampler.tiles_pinned_count(), 4u);
+  for (uint32_t tile = 0; tile < 16; ++tile) {  // a ninth pin would wait for ever
+    const Vec2 middle((static_cast<float>(tile % 4) + 0.5f) / 4, (static_cast<float>(tile / 4) + 0.5f) / 4);
+    ASSERT_TRUE(sampler.sample(index, middle, 0, s.cache_counters).ok());
+  }
+  EXPECT_EQ(sampler.tiles_pinned_count(), s.cache_counters.page_requests_count);
 }
 
 TEST(TextureLookup, ATileThatIsTooShortIsCorrupt) {
@@ -124,9 +131,28 @@ TEST(TextureLookup, ATileThatIsTooShortIsCorrupt) {
   s.scene.textures[0].width = s.scene.textures[0].height = 4, s.scene.textures[0].first_page[0] = 0;
   s.prepare({});  // page 0 is a stub of 64 bytes
   TextureSampler sampler(s.scene.textures, *s.cache);
-  const Result<Vec4> found = sampler.sample(0, {0.5f, 0.5f}, s.cache_counters);
+  const Result<Vec4> found = sampler.sample(0, {0.5f, 0.5f}, 0, s.cache_counters);
   ASSERT_FALSE(found.ok());
   EXPECT_EQ(found.error().code, ErrorCode::kCorrupt);
+}
+
+TEST(TextureLookup, ReadsTheLevelAskedForAtItsOwnSize) {
+  // 150 x 67 and its half, rounded down: other texels, so that levels cannot be mistaken for each other.
+  ShadingScene s = empty_scene();
+  const uint32_t index = s.add_texture(150, 67, random_texels(150, 67), true);
+  std::vector<uint8_t> coarse = random_texels(75, 33);
+  for (uint8_t& t : coarse) t = static_cast<uint8_t>(255 - t);
+  const uint32_t half = s.add_texture(75, 33, coarse, true);
+  s.scene.textures[index].level_count = 2;
+  s.scene.textures[index].first_page[1] = s.scene.textures[half].first_page[0];
+  s.prepare({});
+  TextureSampler sampler(s.scene.textures, *s.cache);
+  for (float u = -0.5f; u < 1.5f; u += 0.07f) {
+    const Vec2 uv(u, 1.1f - u);
+    const Vec4 found = sampler.sample(index, uv, 1, s.cache_counters).value();
+    EXPECT_EQ(found, sampler.sample(half, uv, 0, s.cache_counters).value());
+    EXPECT_NE(found, sampler.sample(index, uv, 0, s.cache_counters).value());
+  }
 }
 
 }  // namespace
