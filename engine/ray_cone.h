@@ -18,9 +18,9 @@ struct RayCone {
   float spread = 0;  ///< growth of the width over a unit of length: 2 tan(half the angle), >= 0
 };
 
-/// A pixel is this much wider than the cone of one sample: many samples share a pixel, and what they see is averaged
-/// again. Half of it blurs a picture of one sample a pixel less than its own pixels do.
-inline constexpr float kConePixelShare = 0.5f;
+/// The cone of one sample is this share of a pixel wide: many samples share a pixel, and what they see is averaged again.
+/// With half a pixel the helmet's error at 64 samples was 30 % higher than with the finest texels, with a quarter 1 %.
+inline constexpr float kConePixelShare = 0.25f;
 
 /// Of the solid angle 1 / pdf that a scattered ray stands for, its cone takes a sixteenth: what is seen by scattered
 /// light is blurred by a quarter of the width of the lobe, and seems 3 % wider (square root of 1 + 1/16).
