@@ -83,22 +83,15 @@ void LightBounds::add(const LightBounds& other) {
   cone = cone_union(cone, other.cone);
   emission_angle = std::max(emission_angle, other.emission_angle);
   strength += other.strength;
+  range = std::max(range, other.range);
 }
 
-double light_split_cost(const LightBounds& bounds) {
-  if (!(bounds.strength > 0)) return 0;
-  const double o = std::min(bounds.cone.angle, kPiDouble);
-  const double w = std::min(o + bounds.emission_angle, kPiDouble);
-  const double cos_o = bounds.cone.cos_angle, sin_o = std::sqrt(std::max(0.0, 1 - cos_o * cos_o));
-  // cos(o - 2 w); for emission over a hemisphere 2 w is 2 o + pi, or 2 pi.
-  double shifted = cos_o;
-  if (w < kPiDouble) {
-    const bool hemisphere = std::abs(bounds.emission_angle - 0.5 * kPiDouble) < 1e-3;
-    shifted = hemisphere ? -cos_o : double{sin_cos_of(o - 2 * w).cos};
-  }
-  const double solid_angle = 2 * kPiDouble * (1 - cos_o) + 0.5 * kPiDouble * (2 * w * sin_o - shifted - 2 * o * sin_o + cos_o);
-  const DVec3 diagonal = DVec3(bounds.box.hi) - DVec3(bounds.box.lo);
-  return bounds.strength * solid_angle * glm::dot(diagonal, diagonal);
+double emission_solid_angle(double cosine, double wider, double emission_angle) {
+  const double o = std::min(arc_cosine(static_cast<float>(cosine)) + wider, kPiDouble);
+  const double w = std::min(o + emission_angle, kPiDouble);
+  const SinCos at_o = sin_cos_of(o);
+  return 2 * kPiDouble * (1 - double{at_o.cos}) +
+         0.5 * kPiDouble * (2 * (w - o) * at_o.sin - sin_cos_of(o - 2 * w).cos + at_o.cos);
 }
 
 }  // namespace shoal

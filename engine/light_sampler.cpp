@@ -143,9 +143,9 @@ LightSampler::Bytes LightSampler::bytes_at_most(uint64_t emitters, uint64_t punc
   bytes.resident = emitters * sizeof(double) + punctual * (sizeof(double) + sizeof(uint32_t)) + 4 * sizeof(double);
   bytes.making = lights * sizeof(double);
   if (lights <= kFewLights) return bytes;
-  bytes.resident = std::max(bytes.resident, light_tree_bytes(lights, lights) +
+  bytes.resident = std::max(bytes.resident, light_tree_bytes(lights, lights, punctual > 0) +
                                                 punctual * (sizeof(double) + sizeof(uint32_t)));
-  bytes.making = lights * sizeof(TreeLight);
+  bytes.making = light_building_bytes(lights);
   return bytes;
 }
 

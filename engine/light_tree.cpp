@@ -1,6 +1,7 @@
 #include "engine/light_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -25,8 +26,16 @@ uint32_t cosine_code(double cosine) {
 }
 double cosine_of(uint32_t code) { return (code & kCosineMask) * (2.0 / kCosineMask) - 1; }
 
-/// Of an angle up to pi, rounded down by the error of sin_cos.
-double low_cosine(double angle) {
+/// At most the cosine of an angle that is wider by `more`, below 1e-3: cos(a + e) >= cos a - e sin a - e^2 / 2.
+/// `cosine` may be off by 2e-7, and its sine then by 7e-4.
+double cosine_of_wider(double cosine, double more) {
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  return cosine - more * (sine + 7e-4 + more) - 2e-7;
+}
+
+/// Of a light's emission angle, rounded down by the error of sin_cos.
+double emission_cosine(double angle) {
+  if (angle == double{0.5f * kPi}) return -2e-7;  // of all triangles
   if (angle >= 3.14159) return -1;
   return sin_cos(static_cast<float>(angle)).cos - 2e-7;
 }
@@ -60,12 +69,12 @@ LightNode pack_light_node(const LightBounds& bounds, uint32_t child) {
   if (squared > 0) {
     constexpr double kLargest = std::numeric_limits<float>::max() / 2;  // half, so that the next number is finite too
     const float radius = static_cast<float>(std::min(std::sqrt(squared), kLargest));
-    node.radius = std::nextafter(radius, std::numeric_limits<float>::infinity());
+    node.radius = std::bit_cast<float>(std::bit_cast<uint32_t>(radius) + 1);  // the next number
   }
   node.strength = static_cast<float>(bounds.strength);
   node.axis = encode_direction(Vec3(bounds.cone.axis));
-  node.cosines = cosine_code(low_cosine(bounds.cone.angle + kDirectionCodeError)) |
-                 cosine_code(low_cosine(bounds.emission_angle)) << kEmissionShift |
+  node.cosines = cosine_code(cosine_of_wider(bounds.cone.cos_angle, kDirectionCodeError)) |
+                 cosine_code(emission_cosine(bounds.emission_angle)) << kEmissionShift |
                  (bounds.cone.both_sides ? kBothSides : 0);
   node.child = child;
   return node;
@@ -76,7 +85,7 @@ LightImportance::LightImportance(const LightReceiver& receiver)
   if (has_side_) normal_ = decode_direction(receiver.side);
 }
 
-double LightImportance::operator()(const LightNode& node) const {
+double LightImportance::operator()(const LightNode& node, float range) const {
   const DVec3 from_center = position_ - DVec3(node.center[0], node.center[1], node.center[2]);
   const double distance2 = glm::dot(from_center, from_center), radius2 = double{node.radius} * node.radius;
   // Among the lights; where they are one point there is nothing to see of them.
@@ -92,6 +101,12 @@ double LightImportance::operator()(const LightNode& node) const {
   const double emitted = subtract(axes, sphere).cos;
   if (emitted <= cosine_of(node.cosines >> kEmissionShift)) return 0;
   double importance = node.strength * std::max(emitted, kEdge) / distance2;
+  if (range < std::numeric_limits<float>::infinity()) {
+    // The nearest that a light may be: 1 - (distance / range)^4 (KHR_lights_punctual).
+    const double ratio = (distance2 * scale - node.radius) / range, ratio2 = ratio * ratio;
+    if (ratio > 1 + kEdge) return 0;
+    if (ratio > 0) importance *= std::max(1 - ratio2 * ratio2, kEdge);
+  }
   if (has_side_) {
     const double received = subtract(from_cosine(-glm::dot(normal_, from_center) * scale), sphere).cos + kEdge;
     if (!(received > 0)) return 0;
@@ -100,8 +115,9 @@ double LightImportance::operator()(const LightNode& node) const {
   return importance;
 }
 
-LightTree::LightTree(uint32_t root, std::vector<LightFork> forks, std::vector<uint32_t> leaf_of)
-    : root_(root), forks_(std::move(forks)), leaf_of_(std::move(leaf_of)) {}
+LightTree::LightTree(uint32_t root, std::vector<LightFork> forks, std::vector<uint32_t> leaf_of,
+                     std::vector<LightRanges> ranges)
+    : root_(root), forks_(std::move(forks)), leaf_of_(std::move(leaf_of)), ranges_(std::move(ranges)) {}
 
 LightTree::Choice LightTree::sample(const LightReceiver& receiver, double u) const {
   const LightImportance importance(receiver);
@@ -109,7 +125,7 @@ LightTree::Choice LightTree::sample(const LightReceiver& receiver, double u) con
   uint32_t at = root_;
   while ((at & LightNode::kLeafBit) == 0) {
     const LightFork& fork = forks_[at];
-    const double left = importance(fork.side[0]), right = importance(fork.side[1]);
+    const auto [left, right] = weigh(importance, at).side;
     const double sum = left + right;
     if (!(sum > 0)) return {};
     const double split = left / sum;
@@ -134,13 +150,12 @@ double LightTree::chance(const LightReceiver& receiver, uint32_t light) const {
   double chance = 1;
   uint32_t at = root_;
   while ((at & LightNode::kLeafBit) == 0) {
-    const LightFork& fork = forks_[at];
     const int side = leaf <= at ? 0 : 1;
-    const double left = importance(fork.side[0]), right = importance(fork.side[1]);
+    const auto [left, right] = weigh(importance, at).side;
     const double sum = left + right;
     if (!(sum > 0)) return 0;
     chance *= (side == 0 ? left : right) / sum;
-    at = fork.side[side].child;
+    at = forks_[at].side[side].child;
   }
   return chance;
 }

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "engine/direction_code.h"
@@ -47,11 +48,12 @@ static_assert(sizeof(LightNode) == 32);
 /// The box as a sphere, the cone with the error of its axis; nothing is smaller than in `bounds`.
 LightNode pack_light_node(const LightBounds& bounds, uint32_t child);
 
-/// An estimate of what the lights of a node bring to a place; 0: nothing for certain.
+/// An estimate of what the lights of a node bring to a place; 0: nothing for certain. `range`: so far from itself a light
+/// of the node reaches at most.
 class LightImportance {
  public:
   explicit LightImportance(const LightReceiver& receiver);
-  double operator()(const LightNode& node) const;
+  double operator()(const LightNode& node, float range = std::numeric_limits<float>::infinity()) const;
 
  private:
   glm::dvec3 position_, normal_{0};
@@ -62,12 +64,19 @@ struct alignas(64) LightFork {
   LightNode side[2];
 };
 
+/// How far the lights of each side of a fork reach from themselves at most.
+struct LightRanges {
+  float side[2];
+};
+
 class LightTree {
  public:
   LightTree() = default;  ///< of no lights
   /// `forks[i]` parts the leaves, in their order from left to right, after leaf i: fork i is the one whose left side
   /// ends there. `leaf_of[light]`: its place in that order, kNoIndex: not in the tree.
-  LightTree(uint32_t root, std::vector<LightFork> forks, std::vector<uint32_t> leaf_of);
+  /// `ranges`: of the forks; empty where no light has one.
+  LightTree(uint32_t root, std::vector<LightFork> forks, std::vector<uint32_t> leaf_of,
+            std::vector<LightRanges> ranges);
 
   bool empty() const { return root_ == kNone; }
 
@@ -82,14 +91,27 @@ class LightTree {
   double chance(const LightReceiver& receiver, uint32_t light) const;
 
   uint64_t resident_bytes() const {
-    return forks_.capacity() * sizeof(LightFork) + leaf_of_.capacity() * sizeof(uint32_t);
+    return forks_.capacity() * sizeof(LightFork) + leaf_of_.capacity() * sizeof(uint32_t) +
+           ranges_.capacity() * sizeof(LightRanges);
   }
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
+
+  struct Weights {
+    double side[2];
+  };
+  Weights weigh(const LightImportance& importance, uint32_t fork) const {
+    const LightFork& f = forks_[fork];
+    if (ranges_.empty()) return {{importance(f.side[0]), importance(f.side[1])}};
+    const LightRanges& r = ranges_[fork];
+    return {{importance(f.side[0], r.side[0]), importance(f.side[1], r.side[1])}};
+  }
+
   uint32_t root_ = kNone;
   std::vector<LightFork> forks_;
   std::vector<uint32_t> leaf_of_;
+  std::vector<LightRanges> ranges_;
 };
 
 }  // namespace shoal

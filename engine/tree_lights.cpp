@@ -37,6 +37,7 @@ TreeLight tree_light(const Emitter& emitter, double strength, uint32_t index) {
   for (int c = 0; c < 3; ++c) light.axis[c] = static_cast<float>(normal[c] / length);
   light.emission_angle = 0.5f * kPi;
   light.strength = strength_in_float(strength);
+  light.range = std::numeric_limits<float>::infinity();
   light.light = index;
   light.both_sides = 1;
   return light;
@@ -47,6 +48,7 @@ TreeLight tree_light(const PunctualLight& light, double strength, uint32_t index
   std::copy_n(light.position, 3, out.lo);
   std::copy_n(light.position, 3, out.hi);
   out.strength = strength_in_float(strength);
+  out.range = light.range > 0 ? light.range : std::numeric_limits<float>::infinity();
   out.light = index;
   out.axis[2] = 1, out.angle = NormalCone::kEveryWay;
   const DVec3 direction(light.direction[0], light.direction[1], light.direction[2]);

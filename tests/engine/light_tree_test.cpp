@@ -179,7 +179,7 @@ TEST(LightTree, NoLightThatReachesAPlaceHasChanceZero) {
 }
 
 TEST(LightTree, IsTheSameForAnyNumberOfThreads) {
-  const ManyLights s(10000, 0.01f);
+  const ManyLights s(30000, 0.01f);
   const LightTree one = s.tree(1), three = s.tree(3);
   Numbers numbers(4);
   for (int i = 0; i < 300; ++i) {
