@@ -16,12 +16,18 @@ namespace {
 struct Arguments {
   RenderArguments render;
   std::string output, png, preview, stats, tonemap = "pbr-neutral";
+  std::vector<std::string> aovs;
   float exposure = 0;
 };
+
+Result<AovSet> aovs_of(const Arguments& arguments) {
+  return parse_aovs(fmt::format("{}", fmt::join(arguments.aovs, ",")));
+}
 
 /// What can be said before the scene is read.
 Status check_arguments(const Arguments& arguments) {
   if (const auto curve = parse_tone_curve(arguments.tonemap); !curve.ok()) return curve.error();
+  if (const auto aovs = aovs_of(arguments); !aovs.ok()) return aovs.error();
   if (!std::isfinite(arguments.exposure)) {
     return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
   }
@@ -60,6 +66,7 @@ Status write_outputs(const Arguments& arguments, const PreparedRender& prepared,
 int run_render(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   RenderArguments asked = arguments.render;
+  asked.picture.aovs = aovs_of(arguments).value();
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
   auto prepared = prepare_render(asked, {arguments.render.execution.order}, false, console);
   if (!prepared.ok()) return console.error(prepared.error());
@@ -96,6 +103,11 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--tonemap", arguments->tonemap, "of --png and --preview: pbr-neutral, none")->capture_default_str();
   sub->add_option("--exposure", arguments->exposure, "of --png and --preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
+  sub->add_option("--aov", arguments->aovs,
+                  "more layers in the picture, separated by commas, or all: albedo, normal, depth, position, variance, "
+                  "samples, object_id, material_id, treelets, bytes (docs/aovs.md)")
+      ->allow_extra_args(false)
+      ->type_name("NAMES");
   add_choice(*sub, "--order", arguments->render.execution.order, order_choices(), " (the picture is the same)")
       ->type_name("ORDER");
   sub->callback([arguments, &console, &command] {

@@ -358,6 +358,7 @@ std::string describe_plan(const MemoryPlan& plan) {
                                  format_bytes(plan.top_tree_bytes), format_bytes(plan.table_bytes),
                                  format_bytes(plan.film_bytes));
   if (plan.preview_bytes > 0) text += fmt::format(", preview {}", format_bytes(plan.preview_bytes));
+  if (plan.aov_bytes > 0) text += fmt::format(", AOVs {}", format_bytes(plan.aov_bytes));
   return text + fmt::format(", {} paths in flight {} and their rays {}, page cache {} of {} (geometry {}, attributes {}, "
                             "textures {}), read buffers {}, scratch {}",
                             plan.paths_in_flight, format_bytes(plan.path_state_bytes), format_bytes(plan.ray_bytes),

@@ -310,7 +310,18 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kNames, std::as_bytes(std::span(names))));
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kSourceFiles, std::as_bytes(std::span(sources))));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kMaterialLayers, materials_.layers));
-    return append_rows(writer, tables::kTextureTransforms, materials_.transforms);
+    SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kTextureTransforms, materials_.transforms));
+    return append_rows(writer, tables::kBakedMeshes, baked_meshes());
+  }
+
+  /// The first primitive of each mesh of the world object.
+  std::vector<uint32_t> baked_meshes() const {
+    std::vector<uint32_t> first;
+    if (geometry_.objects.empty() || !geometry_.objects[0].baked) return first;
+    for (const uint32_t mesh : geometry_.objects[0].meshes) {
+      first.push_back(geometry_.meshes[mesh].primitives.front().first_id);
+    }
+    return first;
   }
 
   FileSystem& fs_;

@@ -43,6 +43,11 @@ class Film {
   /// Mean over `samples`: width * height * 4 floats, RGBA, rows from the top; A is the covered fraction.
   std::vector<float> resolve(uint32_t samples) const;
 
+  /// Of a pixel, while nobody adds: the sum of a channel, its samples, and those whose camera ray hit something.
+  const FixedPoint128& sum(size_t pixel, int channel) const { return pixels_[pixel].rgb[channel]; }
+  uint32_t added(size_t pixel) const { return pixels_[pixel].added; }
+  uint32_t covered(size_t pixel) const { return pixels_[pixel].covered; }
+
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
 

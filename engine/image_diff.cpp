@@ -37,8 +37,14 @@ struct Sums {
 
 bool same_bits(float a, float b) { return std::bit_cast<uint32_t>(a) == std::bit_cast<uint32_t>(b); }
 
-void accumulate(float a, float b, ChannelDiff& channel, Sums& sums) {
-  if (!same_bits(a, b)) ++channel.differing_count;
+/// Integers are compared as such: as floats they are rounded above 2^24.
+bool same_bits(const ExrChannel& a, const ExrChannel& b, size_t pixel) {
+  if (!a.integers.empty() && !b.integers.empty()) return a.integers[pixel] == b.integers[pixel];
+  return same_bits(a.values[pixel], b.values[pixel]);
+}
+
+void accumulate(bool same, float a, float b, ChannelDiff& channel, Sums& sums) {
+  if (!same) ++channel.differing_count;
   if (!std::isfinite(a) || !std::isfinite(b)) {
     ++channel.non_finite_count;
     return;
@@ -89,10 +95,9 @@ bool check_windows(const ExrImage& a, const ExrImage& b, ImageDiff& diff) {
 
 void find_first(const ChannelMap& a, const ChannelMap& b, uint32_t width, size_t pixel, ImageDiff& diff) {
   for (const auto& [name, channel] : a) {
-    const float value_a = channel->values[pixel], value_b = b.at(name)->values[pixel];
-    if (same_bits(value_a, value_b)) continue;
-    diff.first = {true,   static_cast<uint32_t>(pixel % width), static_cast<uint32_t>(pixel / width), name, value_a,
-                  value_b};
+    if (same_bits(*channel, *b.at(name), pixel)) continue;
+    diff.first = {true, static_cast<uint32_t>(pixel % width), static_cast<uint32_t>(pixel / width), name,
+                  channel->values[pixel], b.at(name)->values[pixel]};
     return;
   }
 }
@@ -101,7 +106,7 @@ void find_first(const ChannelMap& a, const ChannelMap& b, uint32_t width, size_t
 void count_pixels(const ChannelMap& a, const ChannelMap& b, uint32_t width, ImageDiff& diff) {
   for (size_t pixel = 0; pixel < diff.pixels_count; ++pixel) {
     const bool differs = std::any_of(a.begin(), a.end(), [&](const auto& entry) {
-      return !same_bits(entry.second->values[pixel], b.at(entry.first)->values[pixel]);
+      return !same_bits(*entry.second, *b.at(entry.first), pixel);
     });
     if (!differs) continue;
     if (diff.differing_pixels_count++ == 0) find_first(a, b, width, pixel, diff);
@@ -118,8 +123,9 @@ void compare_channels(const ChannelMap& a, const ChannelMap& b, ImageDiff& diff)
     Sums sums;
     const bool is_color = name == "R" || name == "G" || name == "B";
     for (size_t i = 0; i < channel->values.size(); ++i) {
-      accumulate(channel->values[i], reference[i], result, sums);
-      if (is_color) accumulate(channel->values[i], reference[i], diff.color, color_sums);
+      const bool same = same_bits(*channel, *b.at(name), i);
+      accumulate(same, channel->values[i], reference[i], result, sums);
+      if (is_color) accumulate(same, channel->values[i], reference[i], diff.color, color_sums);
     }
     sums.finish(result);
     diff.channels.push_back(result);

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <thread>
 
+#include "engine/aov_film.h"
 #include "engine/film.h"
 #include "engine/hybrid_paths.h"
 #include "engine/light_sampler.h"
@@ -81,6 +82,7 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
   plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * kFloatPixelBytes;
   if (!execution.preview.path.empty()) plan.preview_bytes = Preview::bytes(picture.width, picture.height);
+  plan.aov_bytes = AovFilm::bytes(picture.aovs, picture.width, picture.height, scene.file);
   plan.read_buffer_bytes = threads * (pages.largest + 2 * kPageAlignment);  // direct reads need their own
   plan.scratch_bytes = kProcessGrowthBytes + threads * kThreadBytes +
                        PageCache::overhead_bytes(scene.file, PagingOptions{.read_depth = 0}) +

@@ -1,5 +1,6 @@
 #include "engine/order_runner.h"
 
+#include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/sorted_paths.h"
 
@@ -84,7 +85,8 @@ void OrderRunner::run_queued(RenderContext& context) {
   const std::unique_ptr<DrainPolicy> policy =
       make_drain_policy(execution_.policy, scaled_policy(execution_.policy_options, execution_.paging, treelets,
                                                          plan_.paths_in_flight));
-  TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_);
+  AovFilm* const loads = context.aovs != nullptr && context.aovs->set().has(Aov::kBytes) ? context.aovs : nullptr;
+  TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_, loads);
   render_queued(context, *queued_, scheduler, batches_);
   context.cache.finish_loads();  // which ask what waits
   queued_.reset();

@@ -14,7 +14,8 @@ namespace shoal {
 
 struct PathState {
   uint32_t pixel = 0;               ///< y * width + x in the film
-  uint32_t sample = 0;
+  uint32_t sample : 31 = 0;
+  uint32_t seeks : 1 = 0;           ///< AOVs: its next vertex is the first, or is seen in mirrors and glass only
   uint32_t bounce = 0;              ///< 0: the camera ray's hit is shaded next
   uint32_t flags : 2 = 0;           ///< PathFlags: the render loop's, not the shader's
   uint32_t light_side : 30 = 0;     ///< LightReceiver::side of the vertex before, the shader's; of the camera nothing

@@ -49,6 +49,12 @@ class RayGroup {
   /// A ray of the group; one that left, until the next is added.
   const GroupRay& ray(uint32_t slot) const { return rays_[slot]; }
 
+  /// `look(ray)` at every ray.
+  template <class Look>
+  void each(const Look& look) const {
+    for (uint32_t i = 0; i < size_; ++i) look(rays_[slot_[i]].ray);
+  }
+
   /// Every ray goes on by one treelet: address, send, trace. Returns the number of rays traced.
   template <class Decide>
   uint32_t step(const TopTree& tree, TraceCounters& counters, const Decide& decide) {

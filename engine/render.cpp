@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/order_runner.h"
 #include "engine/preview.h"
@@ -50,6 +51,7 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
     preview.reset();
   }
   result.rgba = context.film.resolve(picture.samples);
+  if (context.aovs != nullptr) result.layers = context.aovs->resolve(context.film);
   result.counters = context.counters;
   result.plan = plan;
   result.threads = context.threads;
@@ -118,6 +120,10 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample,
                             previewed ? coarse_levels(plan) : 0);
   Film film(picture.width, picture.height);
+  std::unique_ptr<AovFilm> aovs;
+  if (!picture.aovs.empty()) {
+    SHOAL_ASSIGN_OR_RETURN(aovs, AovFilm::create(picture.aovs, picture.width, picture.height, *scene.file));
+  }
   std::optional<Preview> preview;
   if (previewed) preview.emplace(fs, execution.preview, film, samples, execution.threads, start, hooks.warning);
   OrderRunner orders(scene, execution, plan, samples.count());
@@ -131,6 +137,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.start_seconds = start;
   context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;
+  context.aovs = aovs.get();
   const ChosenOrder chosen = orders.run(context);
   cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/aov.h"
 #include "engine/counters.h"
 #include "engine/lens.h"
 #include "engine/memory_plan.h"
@@ -18,6 +19,7 @@
 #include "engine/scene.h"
 #include "engine/shade.h"
 #include "engine/tonemap.h"
+#include "io/image.h"
 #include "io/page_loader.h"
 #include "io/result.h"
 #include "queues/drain_policy.h"
@@ -31,6 +33,7 @@ struct PictureOptions {
   LensOptions lens;     ///< what the picture asks of the camera beyond its record
   uint32_t tile_sample = 1;  ///< for measuring: one in so many 32 x 32 tiles is rendered, the others stay black
   ShadingOptions shading;
+  AovSet aovs;  ///< layers beside the colour, which does not depend on them
 };
 
 enum class Order : uint8_t { kAuto, kQueued, kDepthFirst, kSorted, kHybrid };
@@ -87,6 +90,7 @@ struct RenderHooks {
 
 struct RenderResult {
   std::vector<float> rgba;  ///< width * height * 4
+  std::vector<ExrChannel> layers;  ///< of the AOVs asked for
   RenderCounters counters;
   MemoryPlan plan;
   ChosenOrder order;

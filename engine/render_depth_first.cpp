@@ -57,7 +57,8 @@ class DepthFirstWorker {
       return nullptr;
     };
     while (group_.size() > 0 && !context_.ended.load(std::memory_order_relaxed)) {
-      worker_.step(group_, Phase::kPaging, decide);
+      worker_.step(group_, Phase::kPaging, decide,
+                   [this](const Ray& ray) { return paths_[path_index_of(ray)].state.pixel; });
       finish_rays();
       while (ready_count_ > 0) {
         const uint32_t index = ready_[--ready_count_];
@@ -124,6 +125,7 @@ class DepthFirstWorker {
     treelets_[slot] = treelet;
     if (!pins_[slot]) return nullptr;
     Path& path = paths_[path_index_of(member.ray)];
+    worker_.charge_loads(path.state.pixel);
     if (path.treelet != treelet) worker_.count_batch(pins_[slot]), path.treelet = treelet;
     return pins_[slot].bytes().data();
   }

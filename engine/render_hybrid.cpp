@@ -42,6 +42,9 @@ class HybridWorker final : public RayStream {
     rays.triangle_tests_count += work.triangle_tests;
     if (work.treelets > 1) rays.ray_exits_count += work.treelets - 1;
     worker_.counters().treelet_visits_count += work.treelets;
+    if (worker_.counts_treelets()) {
+      worker_.count_treelets(paths_.states[(&ray - paths_.rays.data()) / 2].pixel, work.treelets);
+    }
     paths_.home.push_back(static_cast<uint32_t>(&ray - paths_.rays.data()));
   }
 
@@ -77,6 +80,7 @@ class HybridWorker final : public RayStream {
 
   void take_home() {
     worker_.enter(Phase::kPaths);
+    if (worker_.charges_loads()) share_loads();
     uint32_t kept = 0;
     for (const uint32_t index : paths_.home) {  // first those whose vertex is complete, for one run through shading
       const Ray& ray = paths_.rays[index];
@@ -89,6 +93,13 @@ class HybridWorker final : public RayStream {
     }
     worker_.let_go();
     paths_.home.clear();
+  }
+
+  /// Pages were read for the packets that met them: the rays that came home since the last time.
+  void share_loads() {
+    if (paths_.home.empty()) return;
+    RenderWorker::SharedLoad load = worker_.load_for(paths_.home.size());
+    for (const uint32_t index : paths_.home) worker_.charge_share(paths_.states[index / 2].pixel, load);
   }
 
   /// Shades the path's vertex, if it has one; without a ray to follow the path is over.

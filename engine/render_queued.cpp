@@ -90,6 +90,7 @@ class QueuedWorker {
     uint32_t path = paths_.to_shade.take(treelet);
     RayBatch batch = paths_.rays.take(treelet);
     if (!worker_.take_in_hand(treelet) || (path != kNoIndex && !worker_.pin_attributes())) return;
+    if (worker_.charges_loads()) share_load(path, batch);
     uint32_t next = 0, count = 0;
     travel([&] {
       if (path != kNoIndex) {
@@ -113,6 +114,19 @@ class QueuedWorker {
     worker_.let_go();
   }
 
+  /// For the cost map: pages that were read for the treelet in hand are shared by all that waited for it.
+  void share_load(uint32_t first_path, const RayBatch& batch) {
+    uint64_t sharers = 0;
+    for (uint32_t path = first_path; path != kNoIndex; path = paths_.state(path).next) ++sharers;
+    batch.each([&](const Ray&) { ++sharers; });
+    if (sharers == 0) return;
+    RenderWorker::SharedLoad load = worker_.load_in_hand(sharers);
+    for (uint32_t path = first_path; path != kNoIndex; path = paths_.state(path).next) {
+      worker_.charge_share(paths_.state(path).pixel, load);
+    }
+    batch.each([&](const Ray& ray) { worker_.charge_share(paths_.state(path_index_of(ray)).pixel, load); });
+  }
+
   /// A ray that has no cursor yet.
   void fresh(const Ray& ray) { fresh_[fresh_count_++] = ray; }
 
@@ -134,7 +148,8 @@ class QueuedWorker {
         }
       }
       if (group_.size() == 0) break;
-      worker_.step(group_, Phase::kQueue, decide);
+      worker_.step(group_, Phase::kQueue, decide,
+                   [this](const Ray& ray) { return paths_.state(path_index_of(ray)).pixel; });
       finish_rays();
     }
     if (context_.ended.load(std::memory_order_relaxed)) {

@@ -72,6 +72,7 @@ Json plan_json(const MemoryPlan& plan) {
           {"table_bytes", plan.table_bytes},
           {"film_bytes", plan.film_bytes},
           {"preview_bytes", plan.preview_bytes},
+          {"aov_bytes", plan.aov_bytes},
           {"path_state_bytes", plan.path_state_bytes},
           {"ray_bytes", plan.ray_bytes},
           {"paths_bytes", plan.paths_bytes()},
@@ -144,6 +145,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"light_choice", picture.shading.light_choice == LightChoice::kTree ? "tree" : "power"},
           {"effects", effects_text(picture.shading.effects)},
           {"texture_filter", picture.shading.texture_filter == TextureFilter::kMip ? "mip" : "bilinear"},
+          {"aovs", aov_names(picture.aovs)},
           {"order", order_name(result.order.order)},
           {"order_asked", order_name(execution.order)},
           {"order_reason", result.order.reason},
@@ -182,6 +184,7 @@ ExrImage picture_image(const RenderResult& result, const Scene& scene, const Pic
     for (size_t i = 0; i < pixels; ++i) channel.values[i] = result.rgba[i * 4 + c];
     image.channels.push_back(std::move(channel));
   }
+  image.channels.insert(image.channels.end(), result.layers.begin(), result.layers.end());
   const CameraRecord record =
       scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
   const CameraRecord camera = seen_through(record, picture.lens);

@@ -56,7 +56,7 @@ class SortedWorker {
       while (group_.size() < group_limit_ && add_next()) {
       }
       if (group_.size() == 0) break;
-      worker_.step(group_, Phase::kPaging, decide);
+      worker_.step(group_, Phase::kPaging, decide, [this](const Ray& ray) { return pixel_of(ray); });
       finish_rays();
       for (uint32_t i = 0; i < ready_count_; ++i) vertex_ready(ready_[i]);
       ready_count_ = 0;
@@ -96,6 +96,8 @@ class SortedWorker {
     return true;
   }
 
+  uint32_t pixel_of(const Ray& ray) { return paths_.state(path_index_of(ray)).pixel; }
+
   /// The page of the ray's next treelet, held until the ray leaves it; none on an error.
   const std::byte* hold(uint32_t slot, const GroupRay& member, TreeletId treelet) {
     if (const std::byte* page = held_.page(slot, treelet)) return page;
@@ -103,6 +105,7 @@ class SortedWorker {
     return held_.hold(slot, treelet, [&] {
       PagePin pin = worker_.pin(treelet);
       if (pin) worker_.count_batch(pin);
+      worker_.charge_loads(pixel_of(member.ray));
       return pin;
     });
   }

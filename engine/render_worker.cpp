@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/preview.h"
 
@@ -81,7 +82,13 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
     : context_(context),
       phases_(context.phases[thread]),
       shader_(context.scene, context.tables, context.picture.shading, context.cache),
-      camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0) {}
+      camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
+      aovs_(context.aovs) {
+  if (aovs_ == nullptr) return;
+  seeks_ = aovs_->set().of_surface();
+  if (aovs_->set().has(Aov::kTreelets)) visits_aovs_ = aovs_;
+  if (aovs_->set().has(Aov::kBytes)) loads_aovs_ = aovs_;
+}
 
 Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
   enter(Phase::kPaths);
@@ -89,6 +96,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.pixel = sample.y * context_.picture.width + sample.x;
   path.sample = sample.sample;
   path.bounce = 0;
+  path.seeks = seeks_;
   path.flags = kPathGoesOn;
   path.throughput = Vec3(1);
   path.bsdf_pdf = 0;
@@ -161,6 +169,8 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
                              result.shadow_t_max, true);
     path.bounce = bounce_after;
   }
+  if (path.seeks != 0) note_features(path, bounce_before, result.has_bounce);
+  charge_loads(path.pixel);
   path.flags &= ~uint32_t{kPathGoesOn};
   if (result.has_bounce) {
     path.flags |= kPathGoesOn;
@@ -186,6 +196,7 @@ void RenderWorker::end_path(const PathState& path) {
     radiance = Vec3(0);
     ++counters_.invalid_samples_count;
   }
+  if (aovs_ != nullptr) end_features(path, radiance);
   if (!context_.film.add(path.pixel, radiance, (path.flags & kPathCovered) != 0)) ++counters_.film_saturated_count;
   ++counters_.samples_committed_count;
   counters_.path_state_moved_bytes += sizeof(PathState);

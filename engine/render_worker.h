@@ -17,6 +17,7 @@
 
 namespace shoal {
 
+class AovFilm;
 class Preview;
 
 /// Samples begun together.
@@ -37,6 +38,7 @@ struct RenderContext {
   Film& film;
   unsigned threads;
   Preview* preview = nullptr;  ///< or none
+  AovFilm* aovs = nullptr;     ///< or none
 
   /// Samples that begin until the order ends: all, but for trials (engine/order_runner.h). Set while no order runs.
   uint64_t end_sample = 0;
@@ -81,13 +83,17 @@ class RenderWorker {
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
 
   /// Every ray of `group` goes on by one treelet; see RayGroup. `sending`: the phase of what `decide` does.
-  template <class Decide>
-  void step(RayGroup& group, Phase sending, const Decide& decide) {
+  /// `pixel_of(ray)`: for cost maps.
+  template <class Decide, class PixelOf>
+  void step(RayGroup& group, Phase sending, const Decide& decide, const PixelOf& pixel_of) {
     enter(Phase::kTopTree);
     group.address(context_.scene.top_tree);
     enter(sending);
     group.send(context_.scene.top_tree, decide);
     enter(Phase::kTraversal);
+    if (visits_aovs_ != nullptr) {
+      group.each([&](const Ray& ray) { count_treelets(pixel_of(ray), 1); });
+    }
     counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_);
   }
   /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
@@ -103,6 +109,25 @@ class RenderWorker {
   void shade_miss(PathState& path);
   /// Adds the path to the film.
   void end_path(const PathState& path);
+
+  /// Cost maps. Treelets that a ray of the pixel entered:
+  bool counts_treelets() const { return visits_aovs_ != nullptr; }
+  void count_treelets(uint32_t pixel, uint64_t count);
+  /// Pages that this thread has read since the last charge were read for a ray of this pixel.
+  void charge_loads(uint32_t pixel) {
+    if (loads_aovs_ != nullptr && uncharged_bytes() > 0) charge_loads_to(pixel);
+  }
+  bool charges_loads() const { return loads_aovs_ != nullptr; }
+  /// Pages that were read for several rays.
+  struct SharedLoad {
+    uint64_t bytes = 0, sharers = 0;
+  };
+  /// What this thread has read since the last charge. Requires: charges_loads().
+  SharedLoad load_for(uint64_t sharers);
+  /// The same, and what was read ahead of the treelet in hand.
+  SharedLoad load_in_hand(uint64_t sharers);
+  /// Takes one of the equal shares from the load. Requires: sharers > 0.
+  void charge_share(uint32_t pixel, SharedLoad& load);
 
   /// The page of a treelet, for one ray or a batch. Nothing on an error (context.ended is set).
   PagePin pin(TreeletId treelet);
@@ -134,6 +159,12 @@ class RenderWorker {
   void hand_in();
 
  private:
+  /// The vertex `bounce`, which was shaded, is what the path sought, or is looked through when it `goes_on`.
+  void note_features(PathState& path, uint32_t bounce, bool goes_on);
+  void end_features(const PathState& path, const Vec3& radiance);
+  uint64_t uncharged_bytes() const { return cache_counters_.decoded_bytes - charged_bytes_; }
+  void charge_loads_to(uint32_t pixel);
+
   RenderContext& context_;
   PhaseClock& phases_;
   Shader shader_;
@@ -145,6 +176,9 @@ class RenderWorker {
   CacheCounters cache_counters_;
   TraceCounters trace_counters_;
   ShadeCounters shade_counters_;
+  AovFilm *aovs_ = nullptr, *visits_aovs_ = nullptr, *loads_aovs_ = nullptr;  ///< where such AOVs are asked for
+  bool seeks_ = false;          ///< paths begin with PathState::seeks
+  uint64_t charged_bytes_ = 0;  ///< of cache_counters_.decoded_bytes
   uint64_t disk_bytes_reported_ = 0;
   double next_report_seconds_ = 0;
 };

@@ -27,6 +27,7 @@ inline constexpr TableId kNames = 12;        ///< JSON: names of materials, came
 inline constexpr TableId kSourceFiles = 13;  ///< engine/source_files.h; absent from files of earlier versions
 inline constexpr TableId kMaterialLayers = 14;     ///< MaterialLayers[]
 inline constexpr TableId kTextureTransforms = 15;  ///< TextureTransform[]
+inline constexpr TableId kBakedMeshes = 20;        ///< words: first primitive of each (engine/object_ids.h); may be absent
 }  // namespace tables
 
 struct SceneHeader {

@@ -76,6 +76,7 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   if (follows_cones_) footprint.emplace(reach(path, surface));
   TextureContext textures = context(counters, cache_counters);
   if (footprint) textures.footprint = &*footprint;
+  if (path.seeks != 0) SHOAL_RETURN_IF_ERROR(note_features(path, surface, material, effects, textures));
   if ((effects & material.effects & kEffectUnlit) != 0) return add_unlit(path, surface, material, textures, counters);
   if ((material.flags & kMaterialEmits) != 0) {
     SHOAL_RETURN_IF_ERROR(add_emission(path, surface, material, textures, counters));

@@ -11,6 +11,7 @@
 #include "engine/effects.h"
 #include "engine/path_state.h"
 #include "engine/scene.h"
+#include "engine/surface_features.h"
 #include "engine/texture_footprint.h"
 #include "engine/texture_sample.h"
 #include "io/page_cache.h"
@@ -96,6 +97,8 @@ class Shader {
   /// Whether PathState::cone is wanted.
   bool follows_cones() const { return follows_cones_; }
   uint64_t texture_tiles_pinned_count() const { return textures_.tiles_pinned_count(); }
+  /// Of the vertex shaded last, if its path sought them (PathState::seeks).
+  const SurfaceFeatures& features() const { return features_; }
 
  private:
   /// Moves path.cone to the surface; what of it textures are looked up for.
@@ -121,6 +124,8 @@ class Shader {
   template <class AnyBsdf>
   void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                      ShadeResult& result) const;
+  Status note_features(const PathState& path, const Surface& surface, const Material& material, uint32_t effects,
+                       TextureContext& textures);
   TextureContext context(ShadeCounters& counters, CacheCounters& cache_counters);
   const MaterialLayers& layers_of(const Material& material) const;
 
@@ -129,6 +134,10 @@ class Shader {
   const ShadingOptions* options_;
   TextureSampler textures_;
   bool follows_cones_;
+  SurfaceFeatures features_;
 };
+
+/// The share of light that the mirrors and the glass of a path left, in [0, 1].
+Vec3 passed_color(const PathState& path);
 
 }  // namespace shoal

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/aov_film.h"
 #include "engine/clock.h"
 
 namespace shoal {
@@ -78,6 +79,7 @@ void TreeletScheduler::take_loaded() {
   cache_.take_loaded(loaded_);
   for (const PageId page : loaded_) {
     const TreeletId treelet = page_treelets_[page];
+    if (loads_aovs_ != nullptr) loads_aovs_->note_read_ahead(page, scene_.file->record(page).raw_bytes);
     if (treelet == kNoIndex || !resident(treelet)) continue;
     decision_.drain.push_back(treelet);
     rays_in_memory_ += paths_.waiting(treelet);

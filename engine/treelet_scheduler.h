@@ -21,6 +21,8 @@
 
 namespace shoal {
 
+class AovFilm;
+
 /// Fits the lengths of decisions to the size of the scene and to the paths in flight.
 PolicyOptions scaled_policy(PolicyOptions options, const PagingOptions& paging, uint32_t treelets,
                             uint32_t paths_in_flight);
@@ -50,13 +52,14 @@ class UsualBatches {
 class TreeletScheduler {
  public:
   TreeletScheduler(const Scene& scene, const QueuedPaths& paths, PageCache& cache, DrainPolicy& policy,
-                   UsualBatches& batches, std::span<const TreeletId> page_treelets)
+                   UsualBatches& batches, std::span<const TreeletId> page_treelets, AovFilm* loads_aovs = nullptr)
       : scene_(scene),
         paths_(paths),
         cache_(cache),
         policy_(policy),
         batches_(batches),
-        page_treelets_(page_treelets) {}
+        page_treelets_(page_treelets),
+        loads_aovs_(loads_aovs) {}
 
   /// The treelet to drain next, or kNoIndex: nothing is worth it yet, or what is wanted is still on its way.
   TreeletId choose(bool more_coming, CacheCounters& counters);
@@ -80,6 +83,7 @@ class TreeletScheduler {
   DrainPolicy& policy_;
   UsualBatches& batches_;
   std::span<const TreeletId> page_treelets_;
+  AovFilm* loads_aovs_;  ///< where loads are charged to pixels, else none
 
   std::mutex mutex_;
   Decision decision_;

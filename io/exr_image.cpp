@@ -27,13 +27,18 @@ Imath::Box2i box(int32_t x, int32_t y, uint32_t width, uint32_t height) {
   return {Imath::V2i(x, y), Imath::V2i(x + static_cast<int32_t>(width) - 1, y + static_cast<int32_t>(height) - 1)};
 }
 
+Imf::PixelType stored_type(const ExrChannel& channel) {
+  if (!channel.integers.empty()) return Imf::UINT;
+  return channel.half ? Imf::HALF : Imf::FLOAT;
+}
+
 Imf::Header make_header(const ExrImage& image) {
   const Imath::Box2i data = box(image.data_x, image.data_y, image.width, image.height);
   const bool framed = image.display_width != 0 && image.display_height != 0;
   Imf::Header header(framed ? box(0, 0, image.display_width, image.display_height) : data, data);
   header.compression() = Imf::ZIP_COMPRESSION;
   for (const ExrChannel& channel : image.channels) {
-    header.channels().insert(channel.name, Imf::Channel(channel.half ? Imf::HALF : Imf::FLOAT));
+    header.channels().insert(channel.name, Imf::Channel(stored_type(channel)));
   }
   for (const auto& [name, text] : image.text) header.insert(name, Imf::StringAttribute(text));
   for (const auto& [name, number] : image.numbers) header.insert(name, Imf::FloatAttribute(number));
@@ -61,15 +66,19 @@ void write_bands(Imf::OutputFile& output, const ExrImage& image) {
     Imf::FrameBuffer frame;
     for (size_t c = 0; c < image.channels.size(); ++c) {
       const ExrChannel& channel = image.channels[c];
-      const float* values = channel.values.data() + first * width;
-      const void* base = values;
-      if (channel.half) {
+      const Imf::PixelType type = stored_type(channel);
+      const void* base = nullptr;
+      if (type == Imf::UINT) {
+        base = channel.integers.data() + first * width;
+      } else if (type == Imf::FLOAT) {
+        base = channel.values.data() + first * width;
+      } else {
+        const float* values = channel.values.data() + first * width;
         halves[c].resize(rows * width);
         std::transform(values, values + rows * width, halves[c].begin(), to_half);
         base = halves[c].data();
       }
-      frame.insert(channel.name, Imf::Slice::Make(channel.half ? Imf::HALF : Imf::FLOAT, base, corner,
-                                                  static_cast<int64_t>(width), rows));
+      frame.insert(channel.name, Imf::Slice::Make(type, base, corner, static_cast<int64_t>(width), rows));
     }
     output.setFrameBuffer(frame);
     output.writePixels(static_cast<int>(rows));
@@ -105,10 +114,19 @@ ExrImage read_checked(Imf::InputFile& input) {
     image.channels.push_back({it.name(), it.channel().type == Imf::HALF, {}});
     ExrChannel& channel = image.channels.back();
     channel.values.resize(size_t{image.width} * image.height);
-    frame.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.values.data(), data));
+    if (it.channel().type == Imf::UINT) {
+      channel.integers.resize(channel.values.size());
+      frame.insert(channel.name, Imf::Slice::Make(Imf::UINT, channel.integers.data(), data));
+    } else {
+      frame.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.values.data(), data));
+    }
   }
   input.setFrameBuffer(frame);
   input.readPixels(data.min.y, data.max.y);
+  for (ExrChannel& channel : image.channels) {
+    std::transform(channel.integers.begin(), channel.integers.end(), channel.values.begin(),
+                   [](uint32_t integer) { return static_cast<float>(integer); });
+  }
   return image;
 }
 
@@ -153,7 +171,8 @@ Result<T> read_file(FileSystem& fs, const std::string& path, uint64_t max_pixels
 Status write_exr(FileSystem& fs, const std::string& path, const ExrImage& image) {
   SHOAL_CHECK(image.width > 0 && image.height > 0 && !image.channels.empty());
   for (const ExrChannel& channel : image.channels) {
-    SHOAL_CHECK(channel.values.size() == uint64_t{image.width} * image.height);
+    const size_t size = channel.integers.empty() ? channel.values.size() : channel.integers.size();
+    SHOAL_CHECK(size == uint64_t{image.width} * image.height);
   }
   SHOAL_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(fs, path));
   ExrOutput stream(file, path);

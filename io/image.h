@@ -46,6 +46,7 @@ struct ExrChannel {
   std::string name;
   bool half = false;           ///< stored as half, else float
   std::vector<float> values;   ///< width * height, rows from the top
+  std::vector<uint32_t> integers = {};  ///< likewise: stored as UINT. Written without `values`, read beside them
 };
 struct ExrImage {
   uint32_t width = 0, height = 0;                 ///< of the data window

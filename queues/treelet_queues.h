@@ -29,6 +29,13 @@ class RayBatch {
   RayBatch(RayBlockPool& pool, BlockId first) : pool_(&pool), next_(first) {}
   /// Copies the next block's rays to `out` and frees the block; 0 at the end.
   uint32_t next_block(RayBlock& out);
+  /// `look(ray)` at every ray that is left, without taking it.
+  template <class Look>
+  void each(const Look& look) const {
+    for (BlockId block = next_; block != kNoIndex; block = pool_->next(block)) {
+      for (uint32_t i = 0; i < pool_->count(block); ++i) look(pool_->block(block).rays[i]);
+    }
+  }
 
  private:
   RayBlockPool* pool_;

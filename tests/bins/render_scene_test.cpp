@@ -136,6 +136,35 @@ TEST(RenderScene, TheOrderIsChosenUnlessItIsNamedAndSaysWhy) {
   EXPECT_EQ(options["order_reason"], "asked for");
 }
 
+TEST(RenderScene, LayersAreWrittenIntoThePictureAndCompared) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const auto render = [&](const std::string& name, const std::vector<std::string>& options) {
+    const ProgramRun run = run_shoal(folder, join(join({"render", folder / "terrain.shoal", "-o", folder / name, "--stats",
+                                                        folder / "out.json"}, options), tiny_picture()));
+    expect_exit(run, 0);
+    return run;
+  };
+  EXPECT_THAT(render("plain.exr", {}).err, ::testing::Not(HasSubstr("AOVs")));
+  EXPECT_THAT(render("a.exr", {"--aov", "normal,object_id,bytes", "--order", "queued"}).err, HasSubstr(", AOVs "));
+  const json stats = parsed(file_text(folder / "out.json"));
+  EXPECT_EQ(stats["options"]["aovs"], (json{"normal", "object_id", "bytes"}));
+  EXPECT_GT(stats["memory"]["aov_bytes"], 0);
+  render("b.exr", {"--aov", "normal", "--aov", "object_id,bytes", "--order", "sorted", "--page-cache", "2M"});
+  std::vector<std::string> names;
+  for (const ExrChannel& channel : read_picture(folder / "a.exr").channels) {
+    names.push_back(channel.name);
+    EXPECT_EQ(channel.integers.empty(), channel.name != "object_id.Y");
+  }
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("R", "G", "B", "A", "normal.X", "normal.Y", "normal.Z",
+                                                     "object_id.Y", "bytes.Y"));
+  expect_exit(run_shoal(folder, {"diff", folder / "a.exr", folder / "b.exr"}), 0);
+  const ProgramRun other = run_shoal(folder, {"diff", folder / "a.exr", folder / "plain.exr"});
+  expect_exit(other, 10);
+  EXPECT_THAT(other.out, HasSubstr("normal.X is in the first picture only"));
+  EXPECT_THAT(other.out, HasSubstr("0 of 384 pixels differ")) << "the colour is the same";
+}
+
 TEST(RenderScene, CompareFindsTheOrdersIdentical) {
   const TemporaryFolder folder;
   make_terrain(folder);

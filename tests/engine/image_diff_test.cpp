@@ -32,6 +32,19 @@ TEST(ImageDiff, EqualPicturesAreIdenticalWhateverTheOrderOfTheirChannels) {
   EXPECT_EQ(diff_text(diff), "identical: 12 pixels, 3 channels, every bit equal");
 }
 
+TEST(ImageDiff, IntegersAreComparedAsSuch) {
+  ExrImage a = picture(2, 1, {"object_id.Y"});
+  a.channels[0].values = {16777216.0f, 5.0f};
+  a.channels[0].integers = {16777216, 5};
+  ExrImage b = a;
+  EXPECT_TRUE(diff_images(a, b).identical);
+  b.channels[0].integers[0] = 16777217;  // the same float
+  const ImageDiff diff = diff_images(a, b);
+  EXPECT_FALSE(diff.identical);
+  EXPECT_EQ(diff.channels[0].differing_count, 1u);
+  EXPECT_TRUE(diff.first.found);
+}
+
 TEST(ImageDiff, OneBitIsADifferenceAndIsFound) {
   const ExrImage a = picture(4, 3, {"R", "G", "B"});
   ExrImage b = a;

@@ -46,6 +46,24 @@ ExrImage one_row(const ExrChannel& channel) {
   return image;
 }
 
+TEST(Exr, ReadsBackIntegers) {
+  ExrImage image = one_row({"R", false, {0.5f, 1, 2}});
+  image.channels.push_back({"object_id.Y", false, {}, {0, 16777217, 0xffffffffu}});
+  MemoryFileSystem fs;
+  ASSERT_TRUE(write_exr(fs, "out.exr", image).ok());
+  const auto read = read_exr(fs, "out.exr", kPixels);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  for (const ExrChannel& channel : read.value().channels) {
+    if (channel.name == "R") {
+      EXPECT_EQ(channel.values, image.channels[0].values);
+      EXPECT_THAT(channel.integers, IsEmpty());
+    } else {
+      EXPECT_EQ(channel.integers, image.channels[1].integers);
+      EXPECT_EQ(channel.values[1], 16777216.0f) << "beside them, rounded";
+    }
+  }
+}
+
 TEST(Exr, ReadsBackEveryChannelAndAttributeThatWasWritten) {
   ExrImage image = make_exr(37, 150);
   image.data_x = 5;
