@@ -67,6 +67,7 @@ class Builder {
                             int depth, LightBounds& bounds) {
     if (clusters.size() == 1) {
       const std::span<TreeLight> inside = lights.subspan(clusters[0].first, clusters[0].count);
+      for (const TreeLight& light : inside) __builtin_prefetch(&leaf_of_[light.light], 1);
       return clusters[0].count <= cluster_size_ ? lay_out_run(inside, first_leaf, depth, bounds)
                                                 : lay_out(inside, first_leaf, depth, bounds);
     }

@@ -73,20 +73,13 @@ void sort_keys(std::vector<KeyedLight>& keys) {
   }
 }
 
-/// lights[i] becomes what was lights[keys[i].index]. Spends the indices.
-void arrange(std::span<TreeLight> lights, std::vector<KeyedLight>& keys) {
-  for (uint32_t start = 0; start < lights.size(); ++start) {
-    if (keys[start].index == start) continue;
-    const TreeLight first = lights[start];
-    uint32_t to = start;
-    for (uint32_t from = keys[to].index; from != start; from = keys[to].index) {
-      lights[to] = lights[from];
-      keys[to].index = to;
-      to = from;
-    }
-    lights[to] = first;
-    keys[to].index = to;
-  }
+/// lights[i] becomes what was lights[keys[i].index]. A copy is quicker than going round cycles in place, where each step
+/// waits for the one before.
+void arrange(std::span<TreeLight> lights, const std::vector<KeyedLight>& keys) {
+  std::vector<TreeLight> sorted;
+  sorted.reserve(lights.size());
+  for (const KeyedLight& k : keys) sorted.push_back(lights[k.index]);
+  std::copy(sorted.begin(), sorted.end(), lights.begin());
 }
 
 class Cutter {
@@ -137,9 +130,9 @@ std::vector<LightCluster> cluster_lights(std::span<TreeLight> lights, uint32_t m
 
 uint64_t clustering_bytes(uint64_t lights) {
   // Two clusters have more lights than one may have; a vector that grows is up to twice as large, and half of that is
-  // copied.
+  // copied. Before, lights are copied.
   const uint64_t clusters = std::min(lights, 2 * lights / cluster_size(lights) + 1);
-  return lights * 2 * sizeof(KeyedLight) + 3 * clusters * sizeof(LightCluster);
+  return lights * sizeof(KeyedLight) + std::max(3 * clusters * sizeof(LightCluster), lights * sizeof(TreeLight));
 }
 
 }  // namespace shoal

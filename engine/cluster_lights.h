@@ -1,7 +1,7 @@
 // Gathers neighbouring lights before the tree over them is built: sorted along a Morton curve of 2^10 steps an axis,
 // and cut into its aligned cells until each has few. Building over clusters, and inside each along the curve, is less
-// work than building over lights. Called by engine/build_light_tree. Pure. Cost: some 100 ns a light, and 16 bytes
-// each while it runs.
+// work than building over lights. Called by engine/build_light_tree. Pure. Cost: some 100 ns a light, and
+// memory for a copy of all.
 #pragma once
 
 #include <cstdint>

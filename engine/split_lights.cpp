@@ -80,8 +80,10 @@ void try_axis(const Buckets& buckets, int axis, Split& best) {
   LightSums left = buckets.sums[std::countr_zero(buckets.used)];
   for (; right_of != 0; right_of &= right_of - 1) {
     const int next = std::countr_zero(right_of);
-    const double cost = light_cost(left) + right_cost[next];
-    if (best.axis < 0 || cost < best.cost) best = {axis, next - 1, cost};
+    if (best.axis < 0 || right_cost[next] < best.cost) {
+      const double cost = light_cost(left) + right_cost[next];
+      if (best.axis < 0 || cost < best.cost) best = {axis, next - 1, cost};
+    }
     left.add(buckets.sums[next]);
   }
 }
@@ -138,8 +140,10 @@ size_t split_run(std::span<const TreeLight> lights) {
   double best_cost = 0;
   LightSums left = sums[0];
   for (size_t i = 1; i < count; ++i) {
-    const double cost = light_cost(left) + right_cost[i];
-    if (i == 1 || cost < best_cost) best = i, best_cost = cost;
+    if (i == 1 || right_cost[i] < best_cost) {
+      const double cost = light_cost(left) + right_cost[i];
+      if (i == 1 || cost < best_cost) best = i, best_cost = cost;
+    }
     left.add(sums[i]);
   }
   return best;
