@@ -105,6 +105,15 @@ void set_emission(Material& material, const std::vector<TextureFacts>& textures)
   if (material.emission_weight > 0) material.flags |= kMaterialEmits;
 }
 
+bool is_lambert(const Material& m) {
+  if (m.metallic > 0 || m.specular > 0 || m.effects != 0) return false;
+  for (const TextureSlot& s : {m.base_color_texture, m.metallic_roughness_texture, m.normal_texture,
+                               m.specular_texture, m.specular_color_texture}) {
+    if (s.texture != kNoIndex) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Result<MaterialPlan> plan_materials(const gltf::Document& document, const std::vector<MaterialUse>& uses) {
@@ -132,6 +141,7 @@ void finish_materials(MaterialPlan& plan, const std::vector<TextureFacts>& textu
     Material& material = plan.materials[m];
     if (covers_all(material, textures, uses[m].vertex_alpha)) material.coverage = CoverageMode::kOpaque;
     set_emission(material, textures);
+    if (is_lambert(material)) material.flags |= kMaterialLambert;
   }
 }
 

@@ -65,7 +65,8 @@ struct TextureTransform {
 };
 
 enum MaterialFlags : uint32_t {
-  kMaterialEmits = 1,      ///< emissive factor > 0 in some channel
+  kMaterialEmits = 1,    ///< emissive factor > 0 in some channel
+  kMaterialLambert = 2,  ///< metallic 0, specular 0, no effects, no texture but emission's
 };
 
 /// What a material calls for beyond the factors and textures of every material. The bits of kLayerEffects need a

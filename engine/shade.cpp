@@ -5,6 +5,7 @@
 
 #include "engine/bsdf.h"
 #include "engine/dispersion.h"
+#include "engine/lambert_bsdf.h"
 #include "engine/material_sample.h"
 #include "engine/math.h"
 #include "engine/sampler.h"
@@ -13,6 +14,13 @@
 
 namespace shoal {
 namespace {
+
+/// Set by a build that bench/effects compares with: everything but Lambert's surfaces and emission is compiled out.
+#ifdef SHOAL_ONLY_LAMBERT
+constexpr bool kOnlyLambert = true;
+#else
+constexpr bool kOnlyLambert = false;
+#endif
 
 /// A path is never ended with more than this probability, so that no survivor is lifted by more than its inverse.
 constexpr float kMinSurvival = 0.05f;
@@ -58,7 +66,7 @@ Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOpt
       tables_(&tables),
       options_(&options),
       textures_(scene.textures, cache),
-      follows_cones_(!scene.textures.empty() && options.texture_filter == TextureFilter::kMip) {}
+      follows_cones_(!kOnlyLambert && !scene.textures.empty() && options.texture_filter == TextureFilter::kMip) {}
 
 Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
                          std::span<const std::byte> attributes, ShadeResult& result, ShadeCounters& counters,
@@ -68,20 +76,27 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   ++counters.vertices_shaded_count;
   const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes);
   const Material& material = scene_->materials[surface.attributes.material];
-  const uint32_t effects = options_->effects.of(material.effects);
-  if (((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {
+  const uint32_t effects = kOnlyLambert ? 0 : options_->effects.of(material.effects);
+  if (!kOnlyLambert && ((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {
     absorb(path, surface, surface.attributes.material, effects);
   }
   std::optional<TextureFootprint> footprint;
-  if (follows_cones_) footprint.emplace(reach(path, surface));
+  if (!kOnlyLambert && follows_cones_) footprint.emplace(reach(path, surface));
   TextureContext textures = context(counters, cache_counters);
   if (footprint) textures.footprint = &*footprint;
-  if (path.seeks != 0) SHOAL_RETURN_IF_ERROR(note_features(path, surface, material, effects, textures));
-  if ((effects & material.effects & kEffectUnlit) != 0) return add_unlit(path, surface, material, textures, counters);
+  if (!kOnlyLambert && path.seeks != 0) {
+    SHOAL_RETURN_IF_ERROR(note_features(path, surface, material, effects, textures));
+  }
+  if (!kOnlyLambert && (effects & material.effects & kEffectUnlit) != 0) {
+    return add_unlit(path, surface, material, textures, counters);
+  }
   if ((material.flags & kMaterialEmits) != 0) {
     SHOAL_RETURN_IF_ERROR(add_emission(path, surface, material, textures, counters));
   }
   if (path.bounce >= options_->bounces) return {};
+  if (kOnlyLambert || ((material.flags & kMaterialLambert) != 0 && effects == 0)) {
+    return shade_lambert(path, surface, material, result, textures, counters);
+  }
   if ((effects & kLayerEffects) != 0) {
     return shade_layers(path, surface, material, effects, result, textures, counters);
   }
@@ -90,6 +105,19 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, textures));
   SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, textures, mapped));
   const Bsdf bsdf(values, tables_->impl().energy_table(), surface.geometric_normal, normal, surface.wo);
+  if (bsdf.black()) return {};
+  const Sides media{path.medium & kPathMediumMask, 0};
+  SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
+  sample_bounce(path, surface, bsdf, media, result);
+  return {};
+}
+
+Status Shader::shade_lambert(PathState& path, const Surface& surface, const Material& material, ShadeResult& result,
+                             TextureContext& textures, ShadeCounters& counters) {
+  const Vec3 factor(material.base_color[0], material.base_color[1], material.base_color[2]);
+  const Vec3 color = glm::clamp(factor * Vec3(surface.color()), 0.0f, 1.0f);
+  const Vec3 normal = facing_normal(surface, surface.front_normal);
+  const LambertBsdf bsdf(color, surface.geometric_normal, normal, surface.wo);
   if (bsdf.black()) return {};
   const Sides media{path.medium & kPathMediumMask, 0};
   SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));

@@ -107,6 +107,8 @@ class Shader {
                       const TextureContext& vertex, ShadeCounters& counters);
   Status add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
                    ShadeCounters& counters);
+  Status shade_lambert(PathState& path, const Surface& surface, const Material& material, ShadeResult& result,
+                       TextureContext& textures, ShadeCounters& counters);
   /// Light and bounce of a material with layers; `effects` is what it is shaded with.
   Status shade_layers(PathState& path, const Surface& surface, const Material& material, uint32_t effects,
                       ShadeResult& result, TextureContext& textures, ShadeCounters& counters);
