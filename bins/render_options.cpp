@@ -59,10 +59,11 @@ Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOp
 }
 
 Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& console) {
-  if (!asked.empty()) {
+  const bool off = (prepared.picture.shading.effects.off & kEffectEnvironment) != 0;
+  if (!asked.empty() || off) {
     const EnvironmentOptions& sky = prepared.picture.shading.environment;
     if (prepared.scene.emitters.empty() && prepared.scene.lights.empty() &&
-        (sky.intensity == 0 || (sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)))) {
+        (off || sky.intensity == 0 || (sky.kind == EnvironmentOptions::Kind::kConstant && sky.radiance == Vec3(0)))) {
       console.warning("the scene has no light and the environment is black: the picture will be black");
     }
     return {};
@@ -234,7 +235,7 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--variant", variant, kVariantHelp);
   app.add_option("--effects", effects,
-                 "force effects of materials off or on: -NAME or +NAME, separated by commas (--effects=-sheen), all, "
+                 "force effects off or on: -NAME or +NAME, separated by commas (--effects=-sheen,-textures), all, "
                  "-all; `shoal info` lists them. On changes no picture")
       ->type_name("LIST");
   static const std::map<std::string, TextureFilter> kFilters{{"mip", TextureFilter::kMip},

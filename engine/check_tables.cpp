@@ -138,7 +138,7 @@ class TableChecker {
 
   const char* material(const Material& m) {
     if (m.coverage > CoverageMode::kBlend) return "a known coverage mode";
-    if (m.flags > (kMaterialEmits | kMaterialLambert)) return "known flags";
+    if ((m.flags & ~kAllMaterialFlags) != 0) return "known flags";
     if (m.effects > kAllMaterialEffects) return "known effects";
     if ((m.effects & kLayerEffects) != 0 && m.layers >= scene_.material_layers.size()) {
       return "the row of its layers";

@@ -142,6 +142,7 @@ void finish_materials(MaterialPlan& plan, const std::vector<TextureFacts>& textu
     if (covers_all(material, textures, uses[m].vertex_alpha)) material.coverage = CoverageMode::kOpaque;
     set_emission(material, textures);
     if (is_lambert(material)) material.flags |= kMaterialLambert;
+    if (uses[m].vertex_colors) material.flags |= kMaterialVertexColors;
   }
 }
 

@@ -26,6 +26,7 @@ struct MaterialUvSets {
 /// What the geometry asks of one material.
 struct MaterialUse {
   bool used = false;
+  bool vertex_colors = false;  ///< some primitive with it has a COLOR_0
   bool vertex_alpha = false;  ///< some primitive with it has a COLOR_0 with alpha
 };
 

@@ -14,7 +14,15 @@ struct Effect {
   std::string_view name, extension;
   uint32_t bit;
 };
-constexpr std::array<Effect, 11> kForceable = {{
+constexpr std::array<Effect, 19> kForceable = {{
+    {"reflection", "glTF 2.0", kEffectReflection},
+    {"emission", "glTF 2.0", kEffectEmission},
+    {"coverage", "glTF 2.0", kEffectCoverage},
+    {"textures", "glTF 2.0", kEffectTextures},
+    {"vertex-colors", "glTF 2.0", kEffectVertexColors},
+    {"punctual-lights", "KHR_lights_punctual", kEffectPunctualLights},
+    {"environment", "", kEffectEnvironment},
+    {"lens", "", kEffectLens},
     {"normal-map", "glTF 2.0", kEffectNormalMap},
     {"texture-transform", "KHR_texture_transform", kEffectTextureTransform},
     {"unlit", "KHR_materials_unlit", kEffectUnlit},
@@ -37,7 +45,7 @@ std::string known_names() {
 Status apply(std::string_view word, EffectChoice& choice) {
   const bool off = word.starts_with('-');
   const std::string_view name = off || word.starts_with('+') ? word.substr(1) : word;
-  uint32_t bits = name == "all" ? kAllMaterialEffects : 0;
+  uint32_t bits = name == "all" ? kAllMaterialEffects | kAllSceneEffects : 0;
   for (const Effect& effect : kForceable) {
     if (effect.name == name) bits = effect.bit;
   }
@@ -70,12 +78,22 @@ void count_caller(EffectState& state, const std::string& name, size_t index) {
   if (state.callers_count++ == 0 || label < state.first_caller) state.first_caller = label;
 }
 
-EffectState called_by_lights(const Scene& scene) {
-  EffectState state{"punctual-lights", "KHR_lights_punctual", 0, "light"};
+void count_materials(const Scene& scene, EffectState& state, const auto& calls) {
+  const std::vector<std::string> names = names_of(scene, "materials", scene.materials.size());
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (calls(scene.materials[i])) count_caller(state, names[i], i);
+  }
+}
+
+void count_lights(const Scene& scene, EffectState& state) {
+  state.caller = "light";
   const std::vector<std::string> names = names_of(scene, "lights", scene.lights.size());
   for (size_t i = 0; i < names.size(); ++i) count_caller(state, names[i], i);
-  state.on = state.callers_count > 0;
-  return state;
+}
+
+void count_option(std::string_view asker, EffectState& state) {
+  state.caller = "option";
+  if (!asker.empty()) count_caller(state, std::string(asker), 0);
 }
 
 EffectState called_by_instances(const Scene& scene) {
@@ -97,9 +115,43 @@ bool has_texture(const Scene& scene, const Material& m) {
   return false;
 }
 
-bool emits(const Material& m) { return (m.flags & kMaterialEmits) != 0; }
-bool covers_in_part(const Material& m) { return m.coverage != CoverageMode::kOpaque; }
 bool reflects(const Material& m) { return (m.effects & kEffectUnlit) == 0 && (m.metallic > 0 || m.specular > 0); }
+
+void count_callers(const Scene& scene, const EffectAskers& askers, EffectState& state) {
+  const auto flagged = [](uint32_t flag) { return [flag](const Material& m) { return (m.flags & flag) != 0; }; };
+  switch (state.bit) {
+    case kEffectReflection: return count_materials(scene, state, reflects);
+    case kEffectEmission: return count_materials(scene, state, flagged(kMaterialEmits));
+    case kEffectCoverage:
+      return count_materials(scene, state, [](const Material& m) { return m.coverage != CoverageMode::kOpaque; });
+    case kEffectTextures:
+      return count_materials(scene, state, [&](const Material& m) { return has_texture(scene, m); });
+    case kEffectVertexColors: return count_materials(scene, state, flagged(kMaterialVertexColors));
+    case kEffectPunctualLights: return count_lights(scene, state);
+    case kEffectEnvironment: return count_option(askers.environment, state);
+    case kEffectLens: return count_option(askers.lens, state);
+    default:
+      return count_materials(scene, state, [&](const Material& m) { return (m.effects & state.bit) != 0; });
+  }
+}
+
+/// Why an effect is on or off, for people.
+std::string reason(const EffectState& e) {
+  std::string why;
+  if (e.caller == "option") {
+    const std::string_view who = e.bit == kEffectLens ? "--aperture or --distortion" : "--environment";
+    why = e.callers_count > 0 ? fmt::format("{} asks for it", e.first_caller)
+                              : fmt::format("no option asks for it: {} would", who);
+  } else if (e.callers_count == 0) {
+    why = fmt::format("no {} calls for it", e.caller);
+  } else {
+    why = fmt::format("{} {}{}", e.callers_count, e.caller, e.callers_count == 1 ? "" : "s");
+    if (!e.first_caller.empty()) why += fmt::format(", first \"{}\"", e.first_caller);
+  }
+  if (e.forced) why += e.on ? "; forced on" : "; forced off";
+  if (e.bit == 0) why += "; cannot be forced";
+  return why;
+}
 
 }  // namespace
 
@@ -123,28 +175,16 @@ std::string effects_text(const EffectChoice& choice) {
   return text;
 }
 
-std::vector<EffectState> effects_plan(const Scene& scene, const EffectChoice& choice) {
-  const std::vector<std::string> names = names_of(scene, "materials", scene.materials.size());
+std::vector<EffectState> effects_plan(const Scene& scene, const EffectChoice& choice, const EffectAskers& askers) {
   std::vector<EffectState> plan;
-  const auto add = [&](std::string_view name, std::string_view extension, uint32_t bit, const auto& calls) {
-    EffectState state{name, extension, bit, "material"};
-    for (size_t i = 0; i < scene.materials.size(); ++i) {
-      if (calls(scene.materials[i])) count_caller(state, names[i], i);
-    }
-    const bool called = state.callers_count > 0;
-    state.on = bit == 0 ? called : (choice.of(called ? bit : 0) & bit) != 0;
-    state.forced = ((choice.off | choice.on) & bit) != 0;
-    plan.push_back(std::move(state));
-  };
-  add("reflection", "glTF 2.0", 0, reflects);
-  add("emission", "glTF 2.0", 0, emits);
-  add("coverage", "glTF 2.0", 0, covers_in_part);
-  add("textures", "glTF 2.0", 0, [&](const Material& m) { return has_texture(scene, m); });
-  plan.push_back(called_by_lights(scene));
-  plan.push_back(called_by_instances(scene));
   for (const Effect& effect : kForceable) {
-    add(effect.name, effect.extension, effect.bit, [&](const Material& m) { return (m.effects & effect.bit) != 0; });
+    EffectState state{effect.name, effect.extension, effect.bit, "material"};
+    count_callers(scene, askers, state);
+    state.on = (choice.of(state.callers_count > 0 ? effect.bit : 0) & effect.bit) != 0;
+    state.forced = ((choice.off | choice.on) & effect.bit) != 0;
+    plan.push_back(std::move(state));
   }
+  plan.push_back(called_by_instances(scene));
   return plan;
 }
 
@@ -156,13 +196,7 @@ uint32_t effects_called_for(const Scene& scene, const EffectChoice& choice) {
 
 std::string effects_plan_text(const std::vector<EffectState>& plan) {
   std::string text;
-  for (const EffectState& e : plan) {
-    std::string why = fmt::format("no {} calls for it", e.caller);
-    if (e.callers_count > 0) why = fmt::format("{} {}{}", e.callers_count, e.caller, e.callers_count == 1 ? "" : "s");
-    if (!e.first_caller.empty()) why += fmt::format(", first \"{}\"", e.first_caller);
-    if (e.forced) why += e.on ? "; forced on" : "; forced off";
-    text += fmt::format("{:<22}{:<5}{}\n", e.name, e.on ? "on" : "off", why);
-  }
+  for (const EffectState& e : plan) text += fmt::format("{:<22}{:<5}{}\n", e.name, e.on ? "on" : "off", reason(e));
   return text;
 }
 
@@ -173,6 +207,7 @@ std::string effects_plan_json(const std::vector<EffectState>& plan) {
                     {"extension", e.extension},
                     {"on", e.on},
                     {"forced", e.forced},
+                    {"can_be_forced", e.bit != 0},
                     {"called_for_by", e.caller},
                     {"callers_count", e.callers_count},
                     {"first_caller", e.first_caller}});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/fill_table.h"
 #include "engine/math.h"
 #include "engine/microfacet.h"
 
@@ -60,13 +61,11 @@ SpecularAlbedo integrate_specular_albedo(float mu, float alpha, int steps) {
   return {static_cast<float>(a / count), static_cast<float>(b / count)};
 }
 
-EnergyTable::EnergyTable() {
-  cells_.reserve(kAlphaCount * kMuCount);
-  for (int row = 0; row < kAlphaCount; ++row) {
-    for (int column = 0; column < kMuCount; ++column) {
-      cells_.push_back(integrate_specular_albedo(mu_at(column), alpha_at(row), kSteps));
-    }
-  }
+EnergyTable::EnergyTable(unsigned threads) : cells_(kAlphaCount * kMuCount) {
+  fill_table(cells_, threads, [](size_t i) {
+    const int row = static_cast<int>(i) / kMuCount, column = static_cast<int>(i) % kMuCount;
+    return integrate_specular_albedo(mu_at(column), alpha_at(row), kSteps);
+  });
 }
 
 SpecularAlbedo EnergyTable::albedo(float mu, float alpha) const {

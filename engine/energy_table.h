@@ -19,7 +19,7 @@ SpecularAlbedo integrate_specular_albedo(float mu, float alpha, int steps);
 
 class EnergyTable {
  public:
-  EnergyTable();  ///< fills the table
+  explicit EnergyTable(unsigned threads = 1);  ///< fills the table
   /// Requires: 0 < mu <= 1, kMinAlpha <= alpha <= 1. Error below 0.3 % of 1 (tested).
   SpecularAlbedo albedo(float mu, float alpha) const;
   uint64_t resident_bytes() const { return cells_.size() * sizeof(SpecularAlbedo); }

@@ -108,6 +108,12 @@ CameraRecord seen_through(const CameraRecord& record, const LensOptions& lens) {
   return seen;
 }
 
+LensOptions pinhole(const LensOptions& lens) {
+  LensOptions without;
+  without.projection = lens.projection, without.fov_degrees = lens.fov_degrees, without.height = lens.height;
+  return without;
+}
+
 Status check_lens(const CameraRecord& record, const LensOptions& lens) {
   SHOAL_RETURN_IF_ERROR(check_numbers(lens));
   const Projection projection = projection_of(record, lens);

@@ -49,6 +49,8 @@ struct LensOptions {
 CameraRecord seen_through(const CameraRecord& record, const LensOptions& lens);
 /// kPerspective to kFisheye.
 Projection projection_of(const CameraRecord& record, const LensOptions& lens);
+/// The same projection through a pinhole, without distortion.
+LensOptions pinhole(const LensOptions& lens);
 /// Whether the options go together with each other and with the record. Fails with: kUsage.
 Status check_lens(const CameraRecord& record, const LensOptions& lens);
 

@@ -60,35 +60,36 @@ double range_attenuation(const PunctualLight& light, double distance2) {
 
 double emitter_area(const Emitter& emitter) { return 0.5 * glm::length(doubled_area_vector(emitter)); }
 
-LightSampler::LightSampler(const Scene& scene, const Environment& environment, unsigned threads, uint64_t few)
-    : scene_(&scene), environment_(&environment) {
+LightSampler::LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment,
+                           unsigned threads, uint64_t few)
+    : scene_(&scene), sources_(sources), environment_(&environment) {
   plant_tree(threads, few);
   if (!has_tree()) weigh_emitters();
   weigh_choices();
 }
 
 double LightSampler::weight_of(const Emitter& emitter) const {
-  const double weight = emitter_area(emitter) * sampled_weight(scene_->materials[emitter.material]);
+  const double weight = emitter_area(emitter) * sampled_weight(sources_.materials[emitter.material]);
   return weight > 0 && std::isfinite(weight) ? weight : 0.0;
 }
 
 template <class Use>
 void LightSampler::each_placed(const Use& use) const {
-  for (uint32_t i = 0; i < scene_->emitters.size(); ++i) {
-    if (const double weight = weight_of(scene_->emitters[i]); weight > 0) use(scene_->emitters[i], weight, i);
+  for (uint32_t i = 0; i < sources_.emitters.size(); ++i) {
+    if (const double weight = weight_of(sources_.emitters[i]); weight > 0) use(sources_.emitters[i], weight, i);
   }
-  for (uint32_t i = 0; i < scene_->lights.size(); ++i) {
-    const PunctualLight& light = scene_->lights[i];
+  for (uint32_t i = 0; i < sources_.lights.size(); ++i) {
+    const PunctualLight& light = sources_.lights[i];
     const double intensity = luminance(vector3(light.intensity));
     if (light.type == PunctualType::kDirectional || !(power_of(light, intensity) > 0) || !std::isfinite(intensity)) {
       continue;
     }
-    use(light, intensity, static_cast<uint32_t>(scene_->emitters.size()) + i);
+    use(light, intensity, static_cast<uint32_t>(sources_.emitters.size()) + i);
   }
 }
 
 void LightSampler::weigh_choices() {
-  const std::vector<PunctualLight>& lights = scene_->lights;
+  const std::span<const PunctualLight> lights = sources_.lights;
   for (uint32_t i = 0; i < lights.size(); ++i) {
     if (!has_tree() || lights[i].type == PunctualType::kDirectional) singles_.push_back(i);
   }
@@ -110,8 +111,8 @@ void LightSampler::weigh_choices() {
 
 void LightSampler::weigh_emitters() {
   std::vector<double> weights;
-  weights.reserve(scene_->emitters.size());
-  for (const Emitter& e : scene_->emitters) weights.push_back(weight_of(e));
+  weights.reserve(sources_.emitters.size());
+  for (const Emitter& e : sources_.emitters) weights.push_back(weight_of(e));
   emitters_ = Distribution1D(weights);
 }
 
@@ -133,7 +134,7 @@ void LightSampler::plant_tree(unsigned threads, uint64_t few) {
   each_placed([&](const auto& light, double strength, uint32_t index) {
     lights.push_back(tree_light(light, strength / largest, index));
   });
-  const size_t indices = scene_->emitters.size() + scene_->lights.size();
+  const size_t indices = sources_.emitters.size() + sources_.lights.size();
   tree_ = build_light_tree(std::move(lights), static_cast<uint32_t>(indices), threads);
 }
 
@@ -159,7 +160,7 @@ LightSample LightSampler::sample(const Vec3& position, const LightReceiver& rece
   double inside = 0;
   const size_t choice = choices_.sample(random.choice, &inside);
   const double chance = choices_.probability(choice);
-  if (choice < singles_.size()) return sample_punctual(scene_->lights[singles_[choice]], position, chance);
+  if (choice < singles_.size()) return sample_punctual(sources_.lights[singles_[choice]], position, chance);
   if (choice > singles_.size()) return sample_environment(chance, random);
   if (!has_tree()) {
     const size_t index = emitters_.sample(inside, nullptr);
@@ -167,13 +168,13 @@ LightSample LightSampler::sample(const Vec3& position, const LightReceiver& rece
   }
   const LightTree::Choice placed = tree_.sample(receiver, inside);
   if (!(placed.chance > 0)) return {};
-  const size_t emitters = scene_->emitters.size();
+  const size_t emitters = sources_.emitters.size();
   if (placed.light < emitters) return sample_emitter(placed.light, position, chance * placed.chance, random);
-  return sample_punctual(scene_->lights[placed.light - emitters], position, chance * placed.chance);
+  return sample_punctual(sources_.lights[placed.light - emitters], position, chance * placed.chance);
 }
 
 double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const {
-  const std::vector<Emitter>& emitters = scene_->emitters;
+  const std::span<const Emitter> emitters = sources_.emitters;
   const auto found = std::lower_bound(emitters.begin(), emitters.end(), hit, [](const Emitter& e, const Hit& h) {
     return e.instance != h.instance ? e.instance < h.instance : e.primitive < h.primitive;
   });
@@ -185,7 +186,7 @@ double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& recei
 LightSample LightSampler::sample_emitter(size_t index, const Vec3& position, double chance,
                                          const LightRandom& random) const {
   LightSample sample;
-  const Emitter& e = scene_->emitters[index];
+  const Emitter& e = sources_.emitters[index];
   const DVec3 area_vector = doubled_area_vector(e);
   const double doubled_area = glm::length(area_vector);
 

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/environment.h"
@@ -42,13 +43,23 @@ struct LightSample {
   Vec3 target_normal{0};               ///< unit, towards the vertex; zero: a point without a surface
 };
 
+/// The lights of a scene as they are shaded: fewer than it has where some are forced off.
+struct LightSources {
+  std::span<const Emitter> emitters;
+  std::span<const PunctualLight> lights;
+  std::span<const Material> materials;  ///< of the emitters
+};
+
 class LightSampler {
  public:
   /// So many placed lights have no tree: two triangles are one lamp, and two lamps gain less than a tree costs.
   static constexpr uint64_t kFewLights = 2;
 
-  /// Keeps references to both. `threads` build the tree, if there are more placed lights than `few`.
-  LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights);
+  /// Keeps references to what it is given. `threads` build the tree, if there are more placed lights than `few`.
+  LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights)
+      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials}, environment, threads, few) {}
+  LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment, unsigned threads,
+               uint64_t few);
 
   bool empty() const { return !(choices_.total() > 0); }
   /// Light is chosen by where it arrives: without, the receiver that the others take does not matter.
@@ -93,6 +104,7 @@ class LightSampler {
   double tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const;
 
   const Scene* scene_;
+  LightSources sources_;
   const Environment* environment_;
   std::vector<uint32_t> singles_;  ///< indices of the punctual lights that are a choice each
   Distribution1D choices_;         ///< singles_, then the tree or the emitters as one, then the environment

@@ -50,6 +50,7 @@ Result<UnlitChoice> light_unlit_scene(FileSystem& fs, Scene& scene, PictureOptio
                                       const ExecutionOptions& execution) {
   if (!scene.emitters.empty() || !scene.lights.empty()) return UnlitChoice::kHasLight;
   picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(1), {}};
+  picture.shading.environment.fallback = true;
   SHOAL_ASSIGN_OR_RETURN(const std::vector<float> by_sky, probe_luminances(fs, scene, picture, execution));
   const double sum = std::accumulate(by_sky.begin(), by_sky.end(), 0.0);
   if (sum >= kDarkMean * static_cast<double>(by_sky.size())) return UnlitChoice::kSky;

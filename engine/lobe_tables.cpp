@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/fill_table.h"
 #include "engine/math.h"
 #include "engine/microfacet.h"
 #include "engine/sheen.h"
@@ -156,7 +157,7 @@ GlassAlbedo integrate_glass_albedo(float mu, float alpha, float eta, int count) 
   return albedo;
 }
 
-GlassTable::GlassTable(std::vector<float> indices) {
+GlassTable::GlassTable(std::vector<float> indices, unsigned threads) {
   if (indices.empty()) indices = {1.5f};
   for (float& ior : indices) ior = std::max(ior, 1 + kLeastBending);
   std::sort(indices.begin(), indices.end());
@@ -171,18 +172,14 @@ GlassTable::GlassTable(std::vector<float> indices) {
       indices[i] = (1 + r) / (1 - r);
     }
   }
-  for (const float ior : indices) {
-    for (const float eta : {ior, 1 / ior}) add_slice(eta);
-  }
-}
-
-void GlassTable::add_slice(float eta) {
-  for (int row = 0; row < kGlassAlpha; ++row) {
-    for (int column = 0; column < kGlassMu; ++column) {
-      cells_.push_back(integrate_glass_albedo(mu_at(column, kGlassMu), alpha_at(row, kGlassAlpha), eta,
-                                              glass_points(row)));
-    }
-  }
+  constexpr size_t kSlice = size_t{kGlassAlpha} * kGlassMu;
+  cells_.resize(2 * indices.size() * kSlice);
+  fill_table(cells_, threads, [&](size_t i) {
+    const size_t slice = i / kSlice;
+    const float ior = indices[slice / 2], eta = slice % 2 == 0 ? ior : 1 / ior;
+    const int row = static_cast<int>(i % kSlice) / kGlassMu, column = static_cast<int>(i % kGlassMu);
+    return integrate_glass_albedo(mu_at(column, kGlassMu), alpha_at(row, kGlassAlpha), eta, glass_points(row));
+  });
 }
 
 GlassAlbedo GlassTable::albedo(float mu, float alpha, float eta) const {
@@ -224,14 +221,12 @@ float integrate_sheen_albedo(float mu, float alpha, int steps) {
   return static_cast<float>(sum * (2.0 * kPi) / (static_cast<double>(steps) * steps));
 }
 
-SheenTable::SheenTable() {
-  for (int row = 0; row < kSheenAlpha; ++row) {
+SheenTable::SheenTable(unsigned threads) : cells_(size_t{kSheenAlpha} * kSheenMu) {
+  fill_table(cells_, threads, [](size_t i) {
+    const int row = static_cast<int>(i) / kSheenMu, column = static_cast<int>(i) % kSheenMu;
     const float y = kFirstSheenRow + (1 - kFirstSheenRow) * even_at(row, kSheenAlpha);
-    const float alpha = std::clamp(y * y, kMinSheenAlpha, 1.0f);
-    for (int column = 0; column < kSheenMu; ++column) {
-      cells_.push_back(integrate_sheen_albedo(mu_at(column, kSheenMu), alpha, kSheenSteps));
-    }
-  }
+    return integrate_sheen_albedo(mu_at(column, kSheenMu), std::clamp(y * y, kMinSheenAlpha, 1.0f), kSheenSteps);
+  });
 }
 
 float SheenTable::albedo(float mu, float alpha) const {
@@ -258,21 +253,17 @@ SpecularAlbedo integrate_anisotropic_albedo(const Vec3& wo, const GgxAnisotropic
   return {static_cast<float>(a / count), static_cast<float>(b / count)};
 }
 
-AnisotropyTable::AnisotropyTable() {
-  for (int t = 0; t < kTurnedStretch; ++t) {
-    for (int row = 0; row < kTurnedAlpha; ++row) {
-      const float alpha = alpha_at(row, kTurnedAlpha);
-      const GgxAnisotropic ggx{stretch_at(t, alpha), alpha};
-      for (int p = 0; p < kTurnedPhi; ++p) {
-        const SinCos phi = sin_cos(phi_at(p));
-        for (int column = 0; column < kTurnedMu; ++column) {
-          const float mu = mu_at(column, kTurnedMu), sine = std::sqrt(std::max(0.0f, (1 - mu) * (1 + mu)));
-          cells_.push_back(
-              integrate_anisotropic_albedo({sine * phi.cos, sine * phi.sin, mu}, ggx, turned_points(ggx.alpha_x)));
-        }
-      }
-    }
-  }
+AnisotropyTable::AnisotropyTable(unsigned threads)
+    : cells_(size_t{kTurnedStretch} * kTurnedAlpha * kTurnedPhi * kTurnedMu) {
+  fill_table(cells_, threads, [](size_t i) {
+    const int cell = static_cast<int>(i), column = cell % kTurnedMu, p = cell / kTurnedMu % kTurnedPhi;
+    const int row = cell / (kTurnedMu * kTurnedPhi) % kTurnedAlpha, t = cell / (kTurnedMu * kTurnedPhi * kTurnedAlpha);
+    const float alpha = alpha_at(row, kTurnedAlpha), mu = mu_at(column, kTurnedMu);
+    const GgxAnisotropic ggx{stretch_at(t, alpha), alpha};
+    const SinCos phi = sin_cos(phi_at(p));
+    const float sine = std::sqrt(std::max(0.0f, (1 - mu) * (1 + mu)));
+    return integrate_anisotropic_albedo({sine * phi.cos, sine * phi.sin, mu}, ggx, turned_points(ggx.alpha_x));
+  });
 }
 
 SpecularAlbedo AnisotropyTable::albedo(const Vec3& wo, const GgxAnisotropic& ggx) const {

@@ -32,14 +32,12 @@ inline bool bends_light(float ior) { return std::abs(ior - 1) >= kLeastBending; 
 class GlassTable {
  public:
   /// `indices` of refraction, of volumes: each has its own slice, unless they are many.
-  explicit GlassTable(std::vector<float> indices);
+  explicit GlassTable(std::vector<float> indices, unsigned threads = 1);
   /// Requires: 0 < mu <= 1, kMinAlpha <= alpha <= 1; eta or 1 / eta is one of the indices or between two.
   GlassAlbedo albedo(float mu, float alpha, float eta) const;
   uint64_t resident_bytes() const { return cells_.size() * sizeof(GlassAlbedo) + places_.size() * sizeof(float); }
 
  private:
-  void add_slice(float eta);
-
   std::vector<float> places_;       ///< of the indices, increasing
   std::vector<GlassAlbedo> cells_;  ///< [index][into it, out of it][alpha][mu]
 };
@@ -48,7 +46,7 @@ float integrate_sheen_albedo(float mu, float alpha, int steps);
 
 class SheenTable {
  public:
-  SheenTable();
+  explicit SheenTable(unsigned threads = 1);
   /// Requires: 0 < mu <= 1, kMinSheenAlpha <= alpha <= 1.
   float albedo(float mu, float alpha) const;
   uint64_t resident_bytes() const { return cells_.size() * sizeof(float); }
@@ -61,7 +59,7 @@ SpecularAlbedo integrate_anisotropic_albedo(const Vec3& wo, const GgxAnisotropic
 
 class AnisotropyTable {
  public:
-  AnisotropyTable();
+  explicit AnisotropyTable(unsigned threads = 1);
   /// Requires: wo.z > 0, kMinAlpha <= alpha_y <= alpha_x <= 1.
   SpecularAlbedo albedo(const Vec3& wo, const GgxAnisotropic& ggx) const;
   uint64_t resident_bytes() const { return cells_.size() * sizeof(SpecularAlbedo); }

@@ -38,7 +38,8 @@ Result<Vec3> mapped_normal(const TextureSlot& slot, float scale, const Surface& 
 Result<Vec3> sample_base_color(const Material& material, const Surface& surface, TextureContext& context) {
   const Vec3 factor(material.base_color[0], material.base_color[1], material.base_color[2]);
   SHOAL_ASSIGN_OR_RETURN(const Vec4 base, lookup(material.base_color_texture, surface, context));
-  return glm::clamp(factor * Vec3(surface.color()) * Vec3(base), 0.0f, 1.0f);
+  const Vec3 color = context.vertex_colors ? Vec3(surface.color()) : Vec3(1);
+  return glm::clamp(factor * color * Vec3(base), 0.0f, 1.0f);
 }
 
 Result<MaterialSample> sample_material(const Material& material, const Surface& surface, TextureContext& context) {

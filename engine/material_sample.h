@@ -19,6 +19,7 @@ struct TextureContext {
   CacheCounters& cache_counters;
   uint64_t& lookups_count;
   std::span<const TextureTransform> transforms = {};  ///< empty: none is applied
+  bool vertex_colors = true;                          ///< false: they are white
   const TextureFootprint* footprint = nullptr;        ///< null: level 0
 
   /// White when the slot is empty. `uv` is before the slot's transform. Fails with: what the cache returns.

@@ -230,9 +230,13 @@ Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, cons
   sizes.table_bytes += directory + entries * sizeof(uint32_t) + lights.resident + kSmallTableBytes;
   const bool layers = size_of(file, tables::kMaterialLayers) > 0 || (picture.shading.effects.on & kLayerEffects) != 0;
   if (layers) sizes.table_bytes += kLobeTableBytes;
+  if ((picture.shading.effects.off & kMaterialSceneEffects) != 0) {  // copies, engine/shaded_materials.h
+    sizes.table_bytes += size_of(file, tables::kMaterials) + size_of(file, tables::kMaterialLayers);
+  }
   sizes.reading_bytes = std::max<uint64_t>(kTablePageBytes + 2 * kPageAlignment, lights.making);
   const EnvironmentOptions& environment = picture.shading.environment;
-  if (environment.kind == EnvironmentOptions::Kind::kImage) {
+  const bool shown = (picture.shading.effects.off & kEffectEnvironment) == 0;
+  if (environment.kind == EnvironmentOptions::Kind::kImage && shown) {
     SHOAL_ASSIGN_OR_RETURN(const HdrImageSize image,
                            hdr_image_size(fs, environment.path, kMaxEnvironmentPixels));
     // Its distribution: a number a pixel, a few words a row.

@@ -19,16 +19,23 @@ inline RayKind kind_of(const Ray& ray) {
   return counted_bounce_of(ray) == 0 ? RayKind::kCamera : RayKind::kBounce;
 }
 
-/// A ray of `path`, not yet addressed. `bounce` is the vertex that it leaves from (shadow) or goes to.
+/// What a ray's coverage is decided by. Never Ray::kNoCoverage.
+inline uint32_t coverage_seed(const PathState& path, uint64_t seed, bool any_hit) {
+  const uint32_t bits = random4(seed, path.pixel, path.sample, path.bounce, Dimension::kCoverage).bits[any_hit ? 1 : 0];
+  return bits == Ray::kNoCoverage ? 0 : bits;
+}
+
+/// A ray of `path`, not yet addressed. `bounce` is the vertex that it leaves from (shadow) or goes to. Without
+/// `coverage` every triangle is there.
 inline Ray make_ray(uint32_t path_index, const PathState& path, uint64_t seed, const Vec3& origin,
-                    const Vec3& direction, float t_max, bool any_hit) {
+                    const Vec3& direction, float t_max, bool any_hit, bool coverage) {
   Ray ray;
   ray.origin = origin;
   ray.direction = direction;
   ray.t = t_max;
   const uint32_t counted = path.bounce < kCountedBounces ? path.bounce : kCountedBounces - 1;
   ray.path = path_index | (counted << kPathIndexBits) | (any_hit ? Ray::kAnyHitBit : 0u);
-  ray.alpha_seed = random4(seed, path.pixel, path.sample, path.bounce, Dimension::kCoverage).bits[any_hit ? 1 : 0];
+  ray.alpha_seed = coverage ? coverage_seed(path, seed, any_hit) : Ray::kNoCoverage;
   return ray;
 }
 

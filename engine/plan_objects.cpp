@@ -23,9 +23,9 @@ void note_material(const gltf::Document& document, const gltf::Primitive& primit
   MaterialUse& use = primitive.material ? uses[*primitive.material] : uses.back();
   use.used = true;
   const auto color = primitive.attributes.find("COLOR_0");
-  if (color != primitive.attributes.end() && document.accessors[color->second].components == 4) {
-    use.vertex_alpha = true;
-  }
+  if (color == primitive.attributes.end()) return;
+  use.vertex_colors = true;
+  if (document.accessors[color->second].components == 4) use.vertex_alpha = true;
 }
 
 void group_objects(GeometryPlan& plan) {

@@ -115,7 +115,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const CameraRecord seen_by =
       scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
   SHOAL_RETURN_IF_ERROR(check_lens(seen_by, picture.lens));
-  const Camera camera(seen_by, picture.width, picture.height, picture.lens);
+  const bool lens = (picture.shading.effects.off & kEffectLens) == 0;
+  const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens));
   const bool previewed = !execution.preview.path.empty();
   const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample,
                             previewed ? coarse_levels(plan) : 0);

@@ -173,6 +173,19 @@ std::string format_bytes(uint64_t bytes) {
   return fmt::format("{:.{}f} {}", value, value < 10 ? 2 : value < 100 ? 1 : 0, kUnits[unit]);
 }
 
+EffectAskers effect_askers(const PictureOptions& picture) {
+  EffectAskers askers;
+  const EnvironmentOptions& sky = picture.shading.environment;
+  if (sky.kind != EnvironmentOptions::Kind::kNone) {
+    askers.environment = sky.fallback ? "a scene without light" : "--environment";
+  }
+  const bool aperture = picture.lens.aperture > 0 || picture.lens.f_stop > 0;
+  const bool distortion = picture.lens.distortion.model != DistortionModel::kNone;
+  if (aperture) askers.lens = distortion ? "--aperture with --distortion" : "--aperture";
+  if (distortion && !aperture) askers.lens = "--distortion";
+  return askers;
+}
+
 ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture) {
   ExrImage image;
   image.width = picture.width;
@@ -215,7 +228,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
                    {"instances_count", scene.top_tree.instance_count()},
                    {"geometry_bytes", scene.header.geometry_bytes},
                    {"resident_table_bytes", scene.resident_bytes()}};
-  json["effects"] = Json::parse(effects_plan_json(effects_plan(scene, picture.shading.effects)));
+  json["effects"] = Json::parse(effects_plan_json(effects_plan(scene, picture.shading.effects, effect_askers(picture))));
   json["memory"] = plan_json(result.plan);
   json["memory"]["peak_cache_bytes"] = result.peak_cache_bytes;
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/effects.h"
 #include "engine/render.h"
 #include "io/image.h"
 
@@ -13,6 +14,9 @@ namespace shoal {
 /// R,G,B,A as float with the attributes of docs/design.md: software, renderTimeSeconds, samplesPerPixel, worldToCamera,
 /// worldToNDC.
 ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture);
+
+/// What of the options asks for effects.
+EffectAskers effect_askers(const PictureOptions& picture);
 
 /// The `--stats` document (schema version, options, machine, memory plan, counters), JSON text.
 std::string stats_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,

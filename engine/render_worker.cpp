@@ -83,6 +83,7 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
       phases_(context.phases[thread]),
       shader_(context.scene, context.tables, context.picture.shading, context.cache),
       camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
+      coverage_(context.tables.has_coverage()),
       aovs_(context.aovs) {
   if (aovs_ == nullptr) return;
   seeks_ = aovs_->set().of_surface();
@@ -117,7 +118,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   counters_.path_state_moved_bytes += sizeof(PathState);
   if (!camera_ray.seen) path.throughput = Vec3(0);
   const float t_max = camera_ray.seen ? kRayInfinity : kRayNowhere;
-  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, t_max, false);
+  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, t_max, false, coverage_);
   ++ray_counters(ray).rays_traced_count;
   return ray;
 }
@@ -166,7 +167,7 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     const uint32_t bounce_after = path.bounce;
     path.bounce = bounce_before;  // the shadow ray belongs to the vertex that it leaves
     rays[count++] = make_ray(path_index, path, seed, result.shadow_origin, result.shadow_direction,
-                             result.shadow_t_max, true);
+                             result.shadow_t_max, true, coverage_);
     path.bounce = bounce_after;
   }
   if (path.seeks != 0) note_features(path, bounce_before, result.has_bounce);
@@ -177,7 +178,8 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     path.origin = result.bounce_origin;
     path.direction = result.bounce_direction;
     path.hit = Hit{};
-    rays[count++] = make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false);
+    rays[count++] =
+        make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false, coverage_);
   }
   for (uint32_t i = 0; i < count; ++i) ++ray_counters(rays[i]).rays_traced_count;
   path.pending.store(count, std::memory_order_relaxed);

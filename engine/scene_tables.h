@@ -65,9 +65,11 @@ struct TextureTransform {
 };
 
 enum MaterialFlags : uint32_t {
-  kMaterialEmits = 1,    ///< emissive factor > 0 in some channel
-  kMaterialLambert = 2,  ///< metallic 0, specular 0, no effects, no texture but emission's
+  kMaterialEmits = 1,         ///< emissive factor > 0 in some channel
+  kMaterialLambert = 2,       ///< metallic 0, specular 0, no effects, no texture but emission's
+  kMaterialVertexColors = 4,  ///< some triangle with it has vertex colours; for the effects plan alone
 };
+inline constexpr uint32_t kAllMaterialFlags = 7;
 
 /// What a material calls for beyond the factors and textures of every material. The bits of kLayerEffects need a
 /// row of MaterialLayers; a material without them is shaded by the plain code (engine/bsdf.h).

@@ -59,14 +59,20 @@ uint32_t light_side(const Surface& surface, const AnyBsdf& bsdf) {
   return bsdf.transmits() ? 0 : encode_direction(surface.geometric_normal);
 }
 
+bool wants_cones(const Scene& scene, const ShadingOptions& options) {
+  const uint32_t called = scene.textures.empty() ? 0 : uint32_t{kEffectTextures};
+  return (options.effects.of(called) & kEffectTextures) != 0 && options.texture_filter == TextureFilter::kMip;
+}
+
 }  // namespace
 
 Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
     : scene_(&scene),
       tables_(&tables),
       options_(&options),
+      materials_(tables.impl().materials.materials()),
       textures_(scene.textures, cache),
-      follows_cones_(!kOnlyLambert && !scene.textures.empty() && options.texture_filter == TextureFilter::kMip) {}
+      follows_cones_(!kOnlyLambert && wants_cones(scene, options)) {}
 
 Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
                          std::span<const std::byte> attributes, ShadeResult& result, ShadeCounters& counters,
@@ -75,7 +81,7 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   path.shadow_radiance = Vec3(0);
   ++counters.vertices_shaded_count;
   const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes);
-  const Material& material = scene_->materials[surface.attributes.material];
+  const Material& material = materials_[surface.attributes.material];
   const uint32_t effects = kOnlyLambert ? 0 : options_->effects.of(material.effects);
   if (!kOnlyLambert && ((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {
     absorb(path, surface, surface.attributes.material, effects);
@@ -115,7 +121,7 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
 Status Shader::shade_lambert(PathState& path, const Surface& surface, const Material& material, ShadeResult& result,
                              TextureContext& textures, ShadeCounters& counters) {
   const Vec3 factor(material.base_color[0], material.base_color[1], material.base_color[2]);
-  const Vec3 color = glm::clamp(factor * Vec3(surface.color()), 0.0f, 1.0f);
+  const Vec3 color = glm::clamp(factor * (textures.vertex_colors ? Vec3(surface.color()) : Vec3(1)), 0.0f, 1.0f);
   const Vec3 normal = facing_normal(surface, surface.front_normal);
   const LambertBsdf bsdf(color, surface.geometric_normal, normal, surface.wo);
   if (bsdf.black()) return {};
@@ -128,7 +134,8 @@ Status Shader::shade_lambert(PathState& path, const Surface& surface, const Mate
 TextureContext Shader::context(ShadeCounters& counters, CacheCounters& cache_counters) {
   const bool moved = (options_->effects.off & kEffectTextureTransform) == 0;
   return {textures_, cache_counters, counters.texture_lookups_count,
-          moved ? std::span<const TextureTransform>(scene_->texture_transforms) : std::span<const TextureTransform>()};
+          moved ? std::span<const TextureTransform>(scene_->texture_transforms) : std::span<const TextureTransform>(),
+          (options_->effects.off & kEffectVertexColors) == 0};
 }
 
 TextureFootprint Shader::reach(PathState& path, const Surface& surface) const {
@@ -181,7 +188,7 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
     TextureContext textures = vertex;
     textures.footprint = nullptr;  // which is of another surface
     SHOAL_ASSIGN_OR_RETURN(const Vec3 emission,
-                           sample_emission(scene_->materials[light.emitter->material], light.emitter_uv, textures));
+                           sample_emission(materials_[light.emitter->material], light.emitter_uv, textures));
     radiance *= emission;
   }
   const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, light.direction);
@@ -240,7 +247,7 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsd
 
 const MaterialLayers& Shader::layers_of(const Material& material) const {
   static constexpr MaterialLayers kNone;  // of a material that an effect is forced on for
-  return (material.effects & kLayerEffects) != 0 ? scene_->material_layers[material.layers] : kNone;
+  return (material.effects & kLayerEffects) != 0 ? tables_->impl().materials.layers()[material.layers] : kNone;
 }
 
 Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
@@ -251,7 +258,7 @@ Status Shader::add_unlit(PathState& path, const Surface& surface, const Material
 }
 
 Vec3 Shader::transmittance(uint32_t medium, float distance) const {
-  const float* absorption = layers_of(scene_->materials[medium - 1]).absorption;
+  const float* absorption = layers_of(materials_[medium - 1]).absorption;
   return {exp2_of(absorption[0] * distance), exp2_of(absorption[1] * distance), exp2_of(absorption[2] * distance)};
 }
 
@@ -259,7 +266,7 @@ void Shader::absorb(PathState& path, const Surface& surface, uint32_t material, 
   uint32_t medium = path.medium & kPathMediumMask;
   // A camera inside a volume sees its boundary from behind.
   if (path.bounce == 0 && (effects & kEffectVolume) != 0 && !surface.front &&
-      layers_of(scene_->materials[material]).volume != 0) {
+      layers_of(materials_[material]).volume != 0) {
     path.medium = medium = material + 1;
   }
   if (medium != 0) path.throughput *= transmittance(medium, glm::length(surface.position.point - path.origin));

@@ -28,6 +28,7 @@ struct EnvironmentOptions {
   std::string path;
   float rotation = 0;   ///< degrees, as Environment takes it
   float intensity = 1;  ///< multiplies the radiance
+  bool fallback = false;  ///< nobody asked for it: the scene has no light
 };
 
 /// By what one of many lights is chosen: a tree, which knows where they are, or their power alone.
@@ -57,6 +58,7 @@ class ShadingTables {
   ~ShadingTables();
   uint64_t resident_bytes() const;
   bool has_lights() const;  ///< anything a shadow ray could be sent to
+  bool has_coverage() const;  ///< a material is there in part
 
   struct Impl;
   const Impl& impl() const { return *impl_; }
@@ -134,6 +136,7 @@ class Shader {
   const Scene* scene_;
   const ShadingTables* tables_;
   const ShadingOptions* options_;
+  std::span<const Material> materials_;
   TextureSampler textures_;
   bool follows_cones_;
   SurfaceFeatures features_;

@@ -1,5 +1,7 @@
 #include "engine/shading_tables.h"
 
+#include <mutex>
+
 #include "engine/dispersion.h"
 
 namespace shoal {
@@ -25,6 +27,40 @@ std::vector<float> glass_indices(const Scene& scene, const EffectChoice& choice)
   return indices;
 }
 
+/// One that is the same for every scene: made by whoever first asks for it.
+template <class Table>
+const Table& made_once(unsigned threads) {
+  static const Table table(threads);
+  return table;
+}
+
+/// The last one is kept: pictures of one scene, such as the probes of engine/light_unlit_scene, ask for the same.
+std::shared_ptr<const GlassTable> glass_table(std::vector<float> indices, unsigned threads) {
+  static std::mutex mutex;
+  static std::vector<float> kept_indices;
+  static std::shared_ptr<const GlassTable> kept;
+  const std::lock_guard lock(mutex);
+  if (kept == nullptr || indices != kept_indices) {
+    kept = std::make_shared<const GlassTable>(indices, threads);
+    kept_indices = std::move(indices);
+  }
+  return kept;
+}
+
+Result<Environment> make_environment(FileSystem& fs, const EnvironmentOptions& options) {
+  switch (options.kind) {
+    case EnvironmentOptions::Kind::kNone:
+      break;
+    case EnvironmentOptions::Kind::kConstant:
+      return Environment(options.radiance * options.intensity);
+    case EnvironmentOptions::Kind::kImage: {
+      SHOAL_ASSIGN_OR_RETURN(ImageF image, read_hdr_image(fs, options.path, kMaxEnvironmentPixels));
+      return Environment(std::move(image), options.rotation, options.intensity);
+    }
+  }
+  return Environment();
+}
+
 }  // namespace
 
 ShadingTables::ShadingTables(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -32,45 +68,45 @@ ShadingTables::~ShadingTables() = default;
 
 Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, const Scene& scene,
                                                              const ShadingOptions& options, unsigned threads) {
-  auto impl = std::make_unique<Impl>();
-  switch (options.environment.kind) {
-    case EnvironmentOptions::Kind::kNone:
-      break;
-    case EnvironmentOptions::Kind::kConstant:
-      impl->environment = Environment(options.environment.radiance * options.environment.intensity);
-      break;
-    case EnvironmentOptions::Kind::kImage: {
-      SHOAL_ASSIGN_OR_RETURN(ImageF image, read_hdr_image(fs, options.environment.path, kMaxEnvironmentPixels));
-      impl->environment = Environment(std::move(image), options.environment.rotation, options.environment.intensity);
-      break;
-    }
+  const EffectChoice& effects = options.effects;
+  auto impl = std::make_unique<Impl>(scene, effects);
+  if ((effects.off & kEffectEnvironment) == 0) {
+    SHOAL_ASSIGN_OR_RETURN(impl->environment, make_environment(fs, options.environment));
   }
+  const std::span<const Material> materials = impl->materials.materials();
+  LightSources sources{scene.emitters, scene.lights, materials};
+  if ((effects.off & kEffectEmission) != 0) sources.emitters = {};
+  if ((effects.off & kEffectPunctualLights) != 0) sources.lights = {};
   const bool planted = options.light_choice == LightChoice::kTree;
-  impl->lights.emplace(scene, impl->environment, threads, planted ? LightSampler::kFewLights : UINT64_MAX);
+  impl->lights.emplace(scene, sources, impl->environment, threads, planted ? LightSampler::kFewLights : UINT64_MAX);
   impl->lights_hit_by_chance = !impl->environment.black();
-  for (const Material& material : scene.materials) {
+  impl->coverage = (effects.on & kEffectCoverage) != 0;
+  const uint32_t called = effects_called_for(scene, effects);
+  bool specular = (called & (kLayerEffects | kEffectReflection)) != 0;
+  for (const Material& material : materials) {
     if ((material.flags & kMaterialEmits) != 0) impl->lights_hit_by_chance = true;
     // An unlit surface shines towards whoever sees it.
-    if ((options.effects.of(material.effects) & kEffectUnlit) != 0) impl->lights_hit_by_chance = true;
-    if (has_specular_lobe(material) && !impl->energy) impl->energy.emplace();
+    if ((effects.of(material.effects) & kEffectUnlit) != 0) impl->lights_hit_by_chance = true;
+    if (material.coverage != CoverageMode::kOpaque) impl->coverage = true;
+    specular = specular || has_specular_lobe(material);
   }
-  const uint32_t called = effects_called_for(scene, options.effects);
-  if ((called & kLayerEffects) != 0 && !impl->energy) impl->energy.emplace();
-  if (std::vector<float> indices = glass_indices(scene, options.effects); !indices.empty()) {
-    impl->glass.emplace(std::move(indices));
+  if (specular) impl->energy = &made_once<EnergyTable>(threads);
+  if (std::vector<float> indices = glass_indices(scene, effects); !indices.empty()) {
+    impl->glass = glass_table(std::move(indices), threads);
   }
-  if ((called & kEffectSheen) != 0) impl->sheen.emplace();
-  if ((called & kEffectAnisotropy) != 0) impl->anisotropy.emplace();
+  if ((called & kEffectSheen) != 0) impl->sheen = &made_once<SheenTable>(threads);
+  if ((called & kEffectAnisotropy) != 0) impl->anisotropy = &made_once<AnisotropyTable>(threads);
   return std::unique_ptr<ShadingTables>(new ShadingTables(std::move(impl)));
 }
 
 uint64_t ShadingTables::resident_bytes() const {
-  return sizeof(Impl) + impl_->environment.resident_bytes() + impl_->lights->resident_bytes() +
-         (impl_->energy ? impl_->energy->resident_bytes() : 0) + (impl_->glass ? impl_->glass->resident_bytes() : 0) +
-         (impl_->sheen ? impl_->sheen->resident_bytes() : 0) +
+  return sizeof(Impl) + impl_->materials.resident_bytes() + impl_->environment.resident_bytes() +
+         impl_->lights->resident_bytes() + (impl_->energy ? impl_->energy->resident_bytes() : 0) +
+         (impl_->glass ? impl_->glass->resident_bytes() : 0) + (impl_->sheen ? impl_->sheen->resident_bytes() : 0) +
          (impl_->anisotropy ? impl_->anisotropy->resident_bytes() : 0);
 }
 
 bool ShadingTables::has_lights() const { return !impl_->lights->empty(); }
+bool ShadingTables::has_coverage() const { return impl_->coverage; }
 
 }  // namespace shoal

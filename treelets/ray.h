@@ -41,6 +41,7 @@ struct alignas(64) Ray {
   uint32_t alpha_seed = 0;       // 60  hash of (pixel, sample, bounce, kind), for stochastic coverage
 
   static constexpr uint32_t kAnyHitBit = 0x80000000u;
+  static constexpr uint32_t kNoCoverage = 0xffffffffu;  ///< alpha_seed: every triangle is there, whatever its alpha
   bool any_hit() const { return (path & kAnyHitBit) != 0; }
 };
 static_assert(sizeof(Ray) == 64 && alignof(Ray) == 64);

@@ -121,6 +121,19 @@ TEST(LayeredFurnace, TheTablesAgreeWithFineIntegrals) {
   }
 }
 
+TEST(LayeredFurnace, AnyNumberOfThreadsMakesTheSameTables) {
+  const SheenTable sheen(3);
+  const GlassTable one({1.5f}, 1), three({1.5f}, 3);
+  for (const float mu : {0.01f, 0.3f, 0.77f, 1.0f}) {
+    for (const float alpha : {0.02f, 0.2f, 0.9f}) {
+      EXPECT_EQ(sheen.albedo(mu, alpha), lobe_tables().sheen->albedo(mu, alpha));
+      for (const float eta : {1.5f, 1 / 1.5f}) {
+        EXPECT_EQ(three.albedo(mu, alpha, eta).sum(0.04f, 1), one.albedo(mu, alpha, eta).sum(0.04f, 1));
+      }
+    }
+  }
+}
+
 TEST(LayeredFurnace, AGlassTableOfManyIndicesIsReadBetweenThem) {
   std::vector<float> indices;
   for (int i = 0; i < 40; ++i) indices.push_back(1.02f + 0.04f * static_cast<float>(i));

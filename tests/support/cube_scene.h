@@ -1,5 +1,5 @@
-// A scene made for looking at one material: a cube with it under a lamp, on a matte floor before a textured sky of
-// emission, with a camera; normals, tangents and two UV sets. Header only; for targets that link the engine.
+// A scene made for looking at one material: a cube with it under a lamp, on a matte floor before an even sky, with a
+// camera; normals, tangents and two UV sets. Header only; for targets that link the engine.
 #pragma once
 
 #include "engine/build_scene.h"
@@ -15,6 +15,8 @@ struct CubeScene {
   MemoryFileSystem fs;
   WrittenScene scene;
   uint32_t texture = 0;  ///< 4 x 4, all channels different, not flat
+  EnvironmentOptions environment{EnvironmentOptions::Kind::kConstant, Vec3(0.4f), {}};
+  LensOptions lens;
 
   /// `subject` is the material of the cube; its extensions are noted as used.
   explicit CubeScene(const Json& subject) {
@@ -41,6 +43,9 @@ struct CubeScene {
   }
 
   std::vector<float> picture(const ShadingOptions& shading, uint32_t samples = 8) {
+    return rendered(shading, samples).rgba;
+  }
+  RenderResult rendered(const ShadingOptions& shading, uint32_t samples = 8) {
     scene.save(fs);
     const auto built = build_scene(fs, "scene.gltf", "scene.shoal", {});
     EXPECT_TRUE(built.ok()) << built.error().message;
@@ -50,10 +55,11 @@ struct CubeScene {
     picture.width = picture.height = 24;
     picture.samples = samples;
     picture.shading = shading;
-    picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(0.4f), {}};
-    const auto result = render(fs, opened.value(), picture, {});
+    picture.shading.environment = environment;
+    picture.lens = lens;
+    auto result = render(fs, opened.value(), picture, {});
     EXPECT_TRUE(result.ok()) << result.error().message;
-    return result.ok() ? result.value().rgba : std::vector<float>();
+    return result.ok() ? std::move(result).value() : RenderResult{};
   }
 
  private:
