@@ -95,6 +95,7 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(check_document(document_bytes_, cap_bytes(), path_));
     SHOAL_ASSIGN_OR_RETURN(document_, gltf::load_document(fs_, path_, options_.limits));
     if (!options_.variant.empty()) SHOAL_RETURN_IF_ERROR(gltf::select_variant(document_, options_.variant));
+    gltf::forget_variants(document_);
     SHOAL_RETURN_IF_ERROR(sources_.add_parts(document_));
     note(document_.warnings);
     SHOAL_ASSIGN_OR_RETURN(pose_, choose_pose(document_, options_.pose));

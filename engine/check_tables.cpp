@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "engine/build_record.h"
+#include "engine/dispersion.h"
 #include "engine/mip_pyramid.h"
 #include "engine/tile_textures.h"
 #include "treelets/attribute_layout.h"
@@ -129,7 +130,7 @@ class TableChecker {
       if (!(v >= 0) || !std::isfinite(v)) return "finite numbers of the right sign";
     }
     for (const float v : {l.ior, l.iridescence_ior}) {
-      if (!(v >= 1) || !std::isfinite(v)) return "a finite index of refraction from 1 on";
+      if (!(v >= 1 && v <= kLargestIor)) return "an index of refraction from 1 to 1000";
     }
     if (l.volume > 1) return "volume to be 0 or 1";
     const bool turned = std::abs(l.anisotropy_cos) <= 1 && std::abs(l.anisotropy_sin) <= 1;
@@ -140,6 +141,10 @@ class TableChecker {
     if (m.coverage > CoverageMode::kBlend) return "a known coverage mode";
     if ((m.flags & ~kAllMaterialFlags) != 0) return "known flags";
     if (m.effects > kAllMaterialEffects) return "known effects";
+    if ((m.flags & kMaterialLambert) != 0 && (m.metallic > 0 || m.specular > 0 || m.effects != 0)) {
+      return "a Lambert surface to be nothing else";
+    }
+    if ((m.effects & kEffectUnlit) != 0 && (m.flags & kMaterialEmits) != 0) return "an unlit surface not to emit";
     if ((m.effects & kLayerEffects) != 0 && m.layers >= scene_.material_layers.size()) {
       return "the row of its layers";
     }
@@ -177,7 +182,9 @@ class TableChecker {
     if (l.type > PunctualType::kSpot) return "a known type";
     const bool numbers = finite(l.position) && finite(l.direction) && finite(l.intensity) &&
                          std::isfinite(l.cos_inner) && std::isfinite(l.cos_outer) && std::isfinite(l.range);
-    return numbers ? nullptr : "finite numbers";
+    if (!numbers) return "finite numbers";
+    const bool shines = l.intensity[0] >= 0 && l.intensity[1] >= 0 && l.intensity[2] >= 0;
+    return shines ? nullptr : "an intensity that is not negative";
   }
 
   const char* camera(const CameraRecord& c) {

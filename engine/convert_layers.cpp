@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "engine/dispersion.h"
 #include "engine/flatten_nodes.h"
 #include "engine/math.h"
 
@@ -10,8 +11,6 @@ namespace shoal {
 namespace {
 
 constexpr double kFloatMax = std::numeric_limits<float>::max();
-/// KHR_materials_ior: 0 stands for infinity. Nothing enters such a material; any large number will do.
-constexpr float kLargestIor = 1000;
 /// A colour of 0 lets nothing pass after any distance; what passes the attenuation distance is 2^-40 then.
 constexpr float kBlackLog2 = -40;
 
@@ -54,6 +53,7 @@ uint32_t layer_effects(const gltf::Material& in) {
 MaterialLayers convert_factors(const gltf::Material& in) {
   const gltf::MaterialExtensions& x = in.more;
   MaterialLayers out;
+  // KHR_materials_ior: 0 stands for infinity. Nothing enters such a material; any large number will do.
   out.ior = in.ior == 0 ? kLargestIor : clamped_float(in.ior, 1, kLargestIor);
   out.transmission = unit(x.transmission);
   out.dispersion = clamped_float(x.dispersion, 0, kFloatMax);

@@ -9,12 +9,15 @@
 
 namespace shoal {
 
+/// No index is larger: dispersion has no bound in a file.
+inline constexpr float kLargestIor = 1000;
 inline constexpr float kShortestWave = 400, kLongestWave = 700;  ///< nm
 
 /// Cauchy's equation with two terms through n_d and the Abbe number V = 20 / dispersion (KHR_materials_dispersion).
 inline float dispersed_ior(float ior, float dispersion, float nanometres) {
   const float inverse_abbe = dispersion / 20;
-  return std::max(1.0f, ior + (ior - 1) * inverse_abbe * (523655 / (nanometres * nanometres) - 1.5168f));
+  const float at_wave = ior + (ior - 1) * inverse_abbe * (523655 / (nanometres * nanometres) - 1.5168f);
+  return std::clamp(at_wave, 1.0f, kLargestIor);
 }
 
 /// Tents between 450, 550 and 650 nm, thrice, so that each channel's mean over the range is 1: white stays white, no

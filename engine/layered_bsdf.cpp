@@ -284,8 +284,11 @@ Vec3 LayeredBsdf::sample_glass(float u_choice, float u1, float u2) const {
 
 LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2) const {
   const auto reflect = [](const Vec3& wo, const Vec3& h) { return glm::normalize(2 * glm::dot(wo, h) * h - wo); };
+  // Where the drawing lobe does not count (evaluate_world), another that does must not answer for it.
   const auto on_side = [&](const Vec3& wi, bool there) {
-    return there ? Direction{wi, frame_.to_world(wi)} : Direction{};
+    const Vec3 world = frame_.to_world(wi);
+    const float side = glm::dot(geometric_normal_, world);
+    return there && (wi.z < 0 ? side < 0 : side > 0) ? Direction{wi, world} : Direction{};
   };
   if (u_lobe < probability_[kSpecular]) {
     const Vec3 wi = reflect(wo_, anisotropic_ ? stretched_.sample_visible_normal(wo_, u1, u2)
@@ -304,7 +307,8 @@ LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2
     case kCoat: {
       const Vec3 wi = reflect(coat_wo_, coat_ggx_.sample_visible_normal(coat_wo_, u1, u2));
       const Vec3 world = coat_frame_.to_world(wi);
-      return wi.z > 0 ? Direction{frame_.to_local(world), world} : Direction{};
+      const bool there = wi.z > 0 && glm::dot(geometric_normal_, world) > 0;
+      return there ? Direction{frame_.to_local(world), world} : Direction{};
     }
     case kSheenLobe: {
       const SinCos phi = sin_cos(2 * kPi * u2);

@@ -38,7 +38,7 @@ constexpr uint64_t kReadAheadShare = 16;
 constexpr unsigned kLeastReadDepth = 4;
 /// Shading tables of any scene: directional albedo, structures.
 constexpr uint64_t kSmallTableBytes = 256 * 1024;
-constexpr uint64_t kLobeTableBytes = 512 * 1024;  // engine/lobe_tables.h, for scenes with layers
+constexpr uint64_t kLobeTableBytes = 1024 * 1024;  // engine/lobe_tables.h, for scenes with layers
 constexpr uint64_t kFloatPixelBytes = 4 * sizeof(float);
 
 /// What is known of a scene before or after its tables are read.

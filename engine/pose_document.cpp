@@ -37,8 +37,10 @@ class Poser {
     AnimationSampler sampler(files_, document_, pose.animation, pose.time);
     std::map<uint32_t, gltf::RestPlace> places;
     for (const gltf::AnimationChannel& channel : document_.animations[pose.animation].channels) {
+      const bool weights = channel.path == AnimatedPath::kWeights;
+      if (weights && !document_.nodes[channel.node].mesh) continue;  // weights of nothing
       SHOAL_ASSIGN_OR_RETURN(const std::vector<double> v, sampler.sample(channel));
-      if (channel.path == AnimatedPath::kWeights) {
+      if (weights) {
         document_.node_weights[channel.node] = v;
         continue;
       }
@@ -258,13 +260,14 @@ Status check_pose(const Scene& scene, const PoseOptions& options) {
                      built.contains("time") && built["time"].is_number();
   std::string found = "with its nodes at rest";
   if (posed) {
-    const auto index = built["animation"].get<uint32_t>();
-    const std::string name = built.value("animation_name", std::string());
+    const auto index = built["animation"].get<uint64_t>();
+    const bool named = built.contains("animation_name") && built["animation_name"].is_string();
+    const std::string name = named ? built["animation_name"].get<std::string>() : std::string();
     const bool animation = options.animation.empty() ? index == 0
                                                      : options.animation == name || index_of(options.animation) == index;
     if (animation && built["time"].get<double>() == options.time.value_or(0)) return {};
     found = fmt::format("at {} s of animation {}{}", built["time"].get<double>(), index,
-                        name.empty() ? "" : " (" + name + ")");
+                        name.empty() ? "" : " (" + gltf::printable(name) + ")");
   }
   return Error{ErrorCode::kUsage,
                fmt::format("{} was built {}: build it again with the --time and --animation that are asked for, or render "

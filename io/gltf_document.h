@@ -296,6 +296,8 @@ Result<Document> load_document(FileSystem& fs, const std::string& path, const Li
 /// Gives every primitive the material that it has in the variant of that name; the first of two with one name.
 /// Fails with: kUsage (no such variant; those there are are named).
 Status select_variant(Document& document, const std::string& name);
+/// What variants would show: not needed once the materials are chosen, and copied with every mesh.
+void forget_variants(Document& document);
 
 /// Document::content_hash of the file as it is now, without reading it as JSON: a block at a time, so any size will do.
 /// Fails with: kInput (missing, a malformed .glb), kStorage.

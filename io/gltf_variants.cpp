@@ -55,4 +55,10 @@ Status select_variant(Document& document, const std::string& name) {
   return {};
 }
 
+void forget_variants(Document& document) {
+  for (Mesh& mesh : document.meshes) {
+    for (Primitive& primitive : mesh.primitives) std::vector<VariantMaterial>().swap(primitive.variant_materials);
+  }
+}
+
 }  // namespace shoal::gltf

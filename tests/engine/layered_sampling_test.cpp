@@ -72,6 +72,24 @@ TEST(LayeredSampling, DrawsDirectionsWithTheDensityItReportsOverTheWholeSphere) 
   }
 }
 
+TEST(LayeredSampling, DrawsAsItReportsWhereNormalsDifferAndLobesEndAtTheSurface) {
+  // A mapped normal under a coat that has the vertices' or one of its own: what a lobe draws on the wrong side of the
+  // surface is no direction, whatever another lobe would make of it.
+  uint32_t stream = 1000;
+  const Vec3 mapped = glm::normalize(Vec3(0.45f, 0, 1)), other = glm::normalize(Vec3(-0.3f, 0.3f, 1));
+  for (LayeredCase c : layered_cases(0.6f)) {
+    if (c.name == "volume that bends nothing") continue;
+    c.material.clearcoat = 0.8f, c.material.clearcoat_roughness = 0.5f;
+    for (const Vec3& coat : {kUp, other}) {
+      c.material.clearcoat_normal = coat;
+      for (const float mu : {0.35f, 0.9f}) {
+        const LayeredBsdf bsdf(c.material, lobe_tables(), kUp, mapped, view(mu));
+        expect_drawn_as_promised(bsdf, stream++, fmt::format("{}, coated, mu {}", c.name, mu));
+      }
+    }
+  }
+}
+
 TEST(LayeredSampling, TheReportedDensityAndWeightAreThoseOfEvaluate) {
   for (const float roughness : {0.3f, 0.8f}) {
     for (const LayeredCase& c : layered_cases(roughness)) {
