@@ -13,6 +13,7 @@
 #include "engine/animation_sample.h"
 #include "engine/flatten_nodes.h"
 #include "engine/scene.h"
+#include "io/gltf_json.h"
 
 namespace shoal {
 
