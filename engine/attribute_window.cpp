@@ -4,6 +4,12 @@
 
 namespace shoal {
 
+std::optional<uint32_t> find_attribute(const gltf::Primitive& primitive, const std::string& name) {
+  const auto found = primitive.attributes.find(name);
+  if (found == primitive.attributes.end()) return std::nullopt;
+  return found->second;
+}
+
 Result<AttributeWindow> AttributeWindow::open(gltf::BufferFiles& files, const gltf::Document& document,
                                               uint32_t accessor, const std::string& place, uint32_t min_components,
                                               uint32_t max_components, uint64_t vertex_count) {

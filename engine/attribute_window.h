@@ -16,6 +16,9 @@ inline constexpr uint64_t kWindowTriangles = 8192;
 /// Triangles whose indices span more vertices than this are gathered one vertex at a time.
 inline constexpr uint64_t kMaxWindowVertices = 4 * 3 * kWindowTriangles;
 
+/// The accessor of an attribute, if the primitive has it.
+std::optional<uint32_t> find_attribute(const gltf::Primitive& primitive, const std::string& name);
+
 class AttributeWindow {
  public:
   /// `place` is for messages. Fails with: kInput (other components, or fewer elements than vertices), kStorage.

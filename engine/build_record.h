@@ -14,7 +14,7 @@
 namespace shoal {
 
 inline constexpr const char* kBuilderVersion = "0.1.0";
-inline constexpr uint32_t kSceneVersion = 4;  ///< SceneHeader::version
+inline constexpr uint32_t kSceneVersion = SceneHeader{}.version;
 
 /// Hash of the JSON and of the sizes of the files it names; with `modification_times` of those too. A file that is
 /// missing counts as such.

@@ -116,8 +116,8 @@ class TableChecker {
   }
 
   const char* layers(const MaterialLayers& l) const {
-    for (const TextureSlot& s : texture_slots(l)) {
-      if (const char* expected = slot(s)) return expected;
+    for (const TextureSlot* s : texture_slots(l)) {
+      if (const char* expected = slot(*s)) return expected;
     }
     for (const float v : {l.transmission, l.clearcoat, l.clearcoat_roughness, l.sheen_color[0], l.sheen_color[1],
                           l.sheen_color[2], l.sheen_roughness, l.anisotropy, l.iridescence, l.diffuse_transmission,
@@ -148,9 +148,8 @@ class TableChecker {
     if ((m.effects & kLayerEffects) != 0 && m.layers >= scene_.material_layers.size()) {
       return "the row of its layers";
     }
-    for (const TextureSlot& s : {m.base_color_texture, m.metallic_roughness_texture, m.normal_texture,
-                                 m.emissive_texture, m.specular_texture, m.specular_color_texture}) {
-      if (const char* expected = slot(s)) return expected;
+    for (const TextureSlot* s : texture_slots(m)) {
+      if (const char* expected = slot(*s)) return expected;
     }
     const float unit[] = {m.base_color[0], m.base_color[1], m.base_color[2], m.base_color[3],
                           m.metallic,      m.roughness,     m.specular,      m.dielectric_f0};

@@ -110,8 +110,8 @@ Status plan_layers(SlotPlanner& slots, const gltf::Material& in, MaterialPlan& p
 }
 
 bool has_transform(const MaterialLayers& l) {
-  for (const TextureSlot& s : texture_slots(l)) {
-    if (s.transform != 0) return true;
+  for (const TextureSlot* s : texture_slots(l)) {
+    if (s->transform != 0) return true;
   }
   return false;
 }

@@ -63,10 +63,7 @@ Status plan_textures(SlotPlanner& slots, const gltf::Material& in, Material& out
 void note_effects(Material& out, const MaterialPlan& plan) {
   if (out.normal_texture.texture != kNoIndex) out.effects |= kEffectNormalMap;
   bool transformed = false;
-  for (const TextureSlot& s : {out.base_color_texture, out.metallic_roughness_texture, out.normal_texture,
-                               out.emissive_texture, out.specular_texture, out.specular_color_texture}) {
-    transformed = transformed || s.transform != 0;
-  }
+  for (const TextureSlot* s : texture_slots(out)) transformed = transformed || s->transform != 0;
   if (out.layers != kNoIndex) {
     const MaterialLayers& layers = plan.layers[out.layers];
     transformed = transformed || has_transform(layers);
@@ -107,9 +104,8 @@ void set_emission(Material& material, const std::vector<TextureFacts>& textures)
 
 bool is_lambert(const Material& m) {
   if (m.metallic > 0 || m.specular > 0 || m.effects != 0) return false;
-  for (const TextureSlot& s : {m.base_color_texture, m.metallic_roughness_texture, m.normal_texture,
-                               m.specular_texture, m.specular_color_texture}) {
-    if (s.texture != kNoIndex) return false;
+  for (const TextureSlot* s : texture_slots(m)) {
+    if (s->texture != kNoIndex && s != &m.emissive_texture) return false;
   }
   return true;
 }

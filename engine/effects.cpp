@@ -78,17 +78,25 @@ void count_caller(EffectState& state, const std::string& name, size_t index) {
   if (state.callers_count++ == 0 || label < state.first_caller) state.first_caller = label;
 }
 
-void count_materials(const Scene& scene, EffectState& state, const auto& calls) {
-  const std::vector<std::string> names = names_of(scene, "materials", scene.materials.size());
+/// Those that effects are called for by, with their names.
+struct Callers {
+  const Scene& scene;
+  const EffectAskers& askers;
+  std::vector<std::string> materials = names_of(scene, "materials", scene.materials.size());
+  std::vector<std::string> lights = names_of(scene, "lights", scene.lights.size());
+};
+
+void count_materials(const Callers& callers, EffectState& state, const auto& calls) {
+  const Scene& scene = callers.scene;
+  const std::vector<std::string>& names = callers.materials;
   for (size_t i = 0; i < names.size(); ++i) {
     if (calls(scene.materials[i])) count_caller(state, names[i], i);
   }
 }
 
-void count_lights(const Scene& scene, EffectState& state) {
+void count_lights(const Callers& callers, EffectState& state) {
   state.caller = "light";
-  const std::vector<std::string> names = names_of(scene, "lights", scene.lights.size());
-  for (size_t i = 0; i < names.size(); ++i) count_caller(state, names[i], i);
+  for (size_t i = 0; i < callers.lights.size(); ++i) count_caller(state, callers.lights[i], i);
 }
 
 void count_option(std::string_view asker, EffectState& state) {
@@ -104,34 +112,33 @@ EffectState called_by_instances(const Scene& scene) {
 }
 
 bool has_texture(const Scene& scene, const Material& m) {
-  for (const TextureSlot& s : {m.base_color_texture, m.metallic_roughness_texture, m.normal_texture,
-                               m.emissive_texture, m.specular_texture, m.specular_color_texture}) {
-    if (s.texture != kNoIndex) return true;
+  for (const TextureSlot* s : texture_slots(m)) {
+    if (s->texture != kNoIndex) return true;
   }
   if ((m.effects & kLayerEffects) == 0) return false;
-  for (const TextureSlot& s : texture_slots(scene.material_layers[m.layers])) {
-    if (s.texture != kNoIndex) return true;
+  for (const TextureSlot* s : texture_slots(scene.material_layers[m.layers])) {
+    if (s->texture != kNoIndex) return true;
   }
   return false;
 }
 
 bool reflects(const Material& m) { return (m.effects & kEffectUnlit) == 0 && (m.metallic > 0 || m.specular > 0); }
 
-void count_callers(const Scene& scene, const EffectAskers& askers, EffectState& state) {
+void count_callers(const Callers& callers, EffectState& state) {
   const auto flagged = [](uint32_t flag) { return [flag](const Material& m) { return (m.flags & flag) != 0; }; };
   switch (state.bit) {
-    case kEffectReflection: return count_materials(scene, state, reflects);
-    case kEffectEmission: return count_materials(scene, state, flagged(kMaterialEmits));
+    case kEffectReflection: return count_materials(callers, state, reflects);
+    case kEffectEmission: return count_materials(callers, state, flagged(kMaterialEmits));
     case kEffectCoverage:
-      return count_materials(scene, state, [](const Material& m) { return m.coverage != CoverageMode::kOpaque; });
+      return count_materials(callers, state, [](const Material& m) { return m.coverage != CoverageMode::kOpaque; });
     case kEffectTextures:
-      return count_materials(scene, state, [&](const Material& m) { return has_texture(scene, m); });
-    case kEffectVertexColors: return count_materials(scene, state, flagged(kMaterialVertexColors));
-    case kEffectPunctualLights: return count_lights(scene, state);
-    case kEffectEnvironment: return count_option(askers.environment, state);
-    case kEffectLens: return count_option(askers.lens, state);
+      return count_materials(callers, state, [&](const Material& m) { return has_texture(callers.scene, m); });
+    case kEffectVertexColors: return count_materials(callers, state, flagged(kMaterialVertexColors));
+    case kEffectPunctualLights: return count_lights(callers, state);
+    case kEffectEnvironment: return count_option(callers.askers.environment, state);
+    case kEffectLens: return count_option(callers.askers.lens, state);
     default:
-      return count_materials(scene, state, [&](const Material& m) { return (m.effects & state.bit) != 0; });
+      return count_materials(callers, state, [&](const Material& m) { return (m.effects & state.bit) != 0; });
   }
 }
 
@@ -176,10 +183,11 @@ std::string effects_text(const EffectChoice& choice) {
 }
 
 std::vector<EffectState> effects_plan(const Scene& scene, const EffectChoice& choice, const EffectAskers& askers) {
+  const Callers callers{scene, askers};
   std::vector<EffectState> plan;
   for (const Effect& effect : kForceable) {
     EffectState state{effect.name, effect.extension, effect.bit, "material"};
-    count_callers(scene, askers, state);
+    count_callers(callers, state);
     state.on = (choice.of(state.callers_count > 0 ? effect.bit : 0) & effect.bit) != 0;
     state.forced = ((choice.off | choice.on) & effect.bit) != 0;
     plan.push_back(std::move(state));

@@ -35,9 +35,7 @@ void read_coat(const MaterialLayers& l, const Surface& surface, bool normal_mapp
   out.clearcoat_normal = facing_normal(surface, surface.front_normal);
   const TextureSlot& slot = l.clearcoat_normal_texture;
   if (slot.texture == kNoIndex || !normal_mapped) return;
-  const Vec3 n = 2.0f * Vec3(reader.texel(slot)) - 1.0f;
-  const Vec3 scaled(n.x * l.clearcoat_normal_scale, n.y * l.clearcoat_normal_scale, n.z);
-  out.clearcoat_normal = facing_normal(surface, map_normal(surface, scaled, slot.uv_set, context.transform(slot)));
+  out.clearcoat_normal = normal_of_texel(reader.texel(slot), l.clearcoat_normal_scale, slot, surface, context);
 }
 
 void read_anisotropy(const MaterialLayers& l, const Material& material, const Surface& surface, LayerReader& reader,

@@ -26,14 +26,14 @@ Result<Vec4> lookup(const TextureSlot& slot, const Surface& surface, TextureCont
   return context.sample(slot, surface.uv(slot.uv_set));
 }
 
-Result<Vec3> mapped_normal(const TextureSlot& slot, float scale, const Surface& surface, TextureContext& context) {
-  SHOAL_ASSIGN_OR_RETURN(const Vec4 texel, context.sample(slot, surface.uv(slot.uv_set)));
+}  // namespace
+
+Vec3 normal_of_texel(const Vec4& texel, float scale, const TextureSlot& slot, const Surface& surface,
+                     const TextureContext& context) {
   const Vec3 n = 2.0f * Vec3(texel) - 1.0f;
   const Vec3 scaled(n.x * scale, n.y * scale, n.z);
   return facing_normal(surface, map_normal(surface, scaled, slot.uv_set, context.transform(slot)));
 }
-
-}  // namespace
 
 Result<Vec3> sample_base_color(const Material& material, const Surface& surface, TextureContext& context) {
   const Vec3 factor(material.base_color[0], material.base_color[1], material.base_color[2]);
@@ -64,7 +64,8 @@ Result<MaterialSample> sample_material(const Material& material, const Surface& 
 Result<Vec3> sample_normal(const Material& material, const Surface& surface, TextureContext& context, bool mapped) {
   const TextureSlot& slot = material.normal_texture;
   if (slot.texture == kNoIndex || !mapped) return facing_normal(surface, surface.front_normal);
-  return mapped_normal(slot, material.normal_scale, surface, context);
+  SHOAL_ASSIGN_OR_RETURN(const Vec4 texel, context.sample(slot, surface.uv(slot.uv_set)));
+  return normal_of_texel(texel, material.normal_scale, slot, surface, context);
 }
 
 }  // namespace shoal

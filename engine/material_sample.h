@@ -36,6 +36,9 @@ Result<Vec3> sample_emission(const Material& material, const Vec2& uv, TextureCo
 Result<Vec3> sample_base_color(const Material& material, const Surface& surface, TextureContext& context);
 /// The values of the BSDF.
 Result<MaterialSample> sample_material(const Material& material, const Surface& surface, TextureContext& context);
+/// The normal that a texel of `slot` says, x and y times `scale`, turned to the side seen.
+Vec3 normal_of_texel(const Vec4& texel, float scale, const TextureSlot& slot, const Surface& surface,
+                     const TextureContext& context);
 /// The shading normal, mapped unless `mapped` is false, and turned to the side seen (engine/surface.h).
 Result<Vec3> sample_normal(const Material& material, const Surface& surface, TextureContext& context,
                            bool mapped = true);

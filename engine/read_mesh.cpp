@@ -10,12 +10,6 @@ namespace shoal {
 
 namespace {
 
-std::optional<uint32_t> find_attribute(const gltf::Primitive& primitive, const std::string& name) {
-  const auto found = primitive.attributes.find(name);
-  if (found == primitive.attributes.end()) return std::nullopt;
-  return found->second;
-}
-
 void move_points(AttributeWindow& window, const AffineDouble& map) {
   for (size_t i = 0; i < window.count(); ++i) {
     float* v = window.vertex(i);

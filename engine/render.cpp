@@ -12,6 +12,10 @@
 namespace shoal {
 namespace {
 
+CameraRecord camera_record(const Scene& scene, const PictureOptions& picture) {
+  return scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
+}
+
 Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
   SHOAL_RETURN_IF_ERROR(check_picture(picture));
   const size_t cameras = std::max<size_t>(scene.cameras.size(), 1);
@@ -19,6 +23,7 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
     return Error{ErrorCode::kUsage,
                  fmt::format("camera {} was asked for, the scene has {}", picture.camera, scene.cameras.size())};
   }
+  SHOAL_RETURN_IF_ERROR(check_lens(camera_record(scene, picture), picture.lens));
   if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
     return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
                                                 fmt::join(drain_policy_names(), ", "))};
@@ -112,9 +117,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   execution.paging.read_depth = plan.read_depth;
   if (hooks.planned) hooks.planned(plan);
 
-  const CameraRecord seen_by =
-      scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
-  SHOAL_RETURN_IF_ERROR(check_lens(seen_by, picture.lens));
+  const CameraRecord seen_by = camera_record(scene, picture);
   const bool lens = (picture.shading.effects.off & kEffectLens) == 0;
   const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens));
   const bool previewed = !execution.preview.path.empty();

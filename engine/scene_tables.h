@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
+#include <type_traits>
 
 #include "io/page_file.h"
 #include "treelets/coverage.h"
@@ -132,10 +134,22 @@ struct MaterialLayers {
 };
 static_assert(sizeof(MaterialLayers) == 192);
 
-inline std::array<TextureSlot, 11> texture_slots(const MaterialLayers& l) {
-  return {l.transmission_texture, l.clearcoat_texture, l.clearcoat_roughness_texture, l.clearcoat_normal_texture,
-          l.sheen_color_texture, l.sheen_roughness_texture, l.anisotropy_texture, l.iridescence_texture,
-          l.film_texture, l.diffuse_transmission_texture, l.diffuse_transmission_color_texture};
+/// All slots of a row, as pointers, to be read or (of a row that is not const) changed.
+template <class M>
+  requires std::same_as<std::remove_const_t<M>, Material>
+auto texture_slots(M& m) {
+  return std::array{&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
+                    &m.emissive_texture,   &m.specular_texture,           &m.specular_color_texture};
+}
+template <class L>
+  requires std::same_as<std::remove_const_t<L>, MaterialLayers>
+auto texture_slots(L& l) {
+  return std::array{&l.transmission_texture,        &l.clearcoat_texture,
+                    &l.clearcoat_roughness_texture, &l.clearcoat_normal_texture,
+                    &l.sheen_color_texture,         &l.sheen_roughness_texture,
+                    &l.anisotropy_texture,          &l.iridescence_texture,
+                    &l.film_texture,                &l.diffuse_transmission_texture,
+                    &l.diffuse_transmission_color_texture};
 }
 
 inline constexpr uint32_t kTextureTileTexels = 64;  ///< a tile is 64 x 64 RGBA8: 16 KiB decoded

@@ -15,7 +15,7 @@
 namespace shoal {
 namespace {
 
-/// Set by a build that bench/effects compares with: everything but Lambert's surfaces and emission is compiled out.
+/// Set by a build that bench/effects_price compares with: all but Lambert's surfaces and emission is compiled out.
 #ifdef SHOAL_ONLY_LAMBERT
 constexpr bool kOnlyLambert = true;
 #else

@@ -3,20 +3,9 @@
 namespace shoal {
 namespace {
 
-void take_textures(Material& m) {
-  for (TextureSlot* slot : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
-                            &m.emissive_texture, &m.specular_texture, &m.specular_color_texture}) {
-    slot->texture = kNoIndex;
-  }
-}
-
-void take_textures(MaterialLayers& l) {
-  for (TextureSlot* slot :
-       {&l.transmission_texture, &l.clearcoat_texture, &l.clearcoat_roughness_texture, &l.clearcoat_normal_texture,
-        &l.sheen_color_texture, &l.sheen_roughness_texture, &l.anisotropy_texture, &l.iridescence_texture,
-        &l.film_texture, &l.diffuse_transmission_texture, &l.diffuse_transmission_color_texture}) {
-    slot->texture = kNoIndex;
-  }
+template <class Row>
+void take_textures(Row& row) {
+  for (TextureSlot* slot : texture_slots(row)) slot->texture = kNoIndex;
 }
 
 void take_effects(Material& m, uint32_t off) {

@@ -10,18 +10,12 @@ namespace {
 
 constexpr uint32_t kMaxJointSets = 4;
 
-std::optional<uint32_t> find(const gltf::Primitive& primitive, const std::string& name) {
-  const auto found = primitive.attributes.find(name);
-  if (found == primitive.attributes.end()) return std::nullopt;
-  return found->second;
-}
-
 /// Sets of joints and weights, from 0 on.
 uint32_t joint_set_count(const gltf::Mesh& mesh, const gltf::Primitive& primitive) {
   if (!mesh.joints) return 0;
   uint32_t count = 0;
-  while (count < kMaxJointSets && find(primitive, fmt::format("JOINTS_{}", count)) &&
-         find(primitive, fmt::format("WEIGHTS_{}", count))) {
+  while (count < kMaxJointSets && find_attribute(primitive, fmt::format("JOINTS_{}", count)) &&
+         find_attribute(primitive, fmt::format("WEIGHTS_{}", count))) {
     ++count;
   }
   return count;
@@ -85,9 +79,11 @@ Result<VertexPose> VertexPose::open(gltf::BufferFiles& files, const gltf::Docume
   }
   for (uint32_t s = 0; s < joint_set_count(mesh, primitive); ++s) {
     const std::string joints = fmt::format("JOINTS_{}", s), weights = fmt::format("WEIGHTS_{}", s);
-    SHOAL_ASSIGN_OR_RETURN(auto joint_window, AttributeWindow::open(files, document, *find(primitive, joints),
+    const uint32_t joint_accessor = *find_attribute(primitive, joints);
+    const uint32_t weight_accessor = *find_attribute(primitive, weights);
+    SHOAL_ASSIGN_OR_RETURN(auto joint_window, AttributeWindow::open(files, document, joint_accessor,
                                                                     place + "." + joints, 4, 4, vertex_count));
-    SHOAL_ASSIGN_OR_RETURN(auto weight_window, AttributeWindow::open(files, document, *find(primitive, weights),
+    SHOAL_ASSIGN_OR_RETURN(auto weight_window, AttributeWindow::open(files, document, weight_accessor,
                                                                      place + "." + weights, 4, 4, vertex_count));
     pose.joint_sets_.push_back({std::move(joint_window), std::move(weight_window)});
   }

@@ -11,7 +11,7 @@ namespace shoal {
 
 class VertexPose {
  public:
-  /// Whether the primitive's vertices stay as they are stored.
+  /// Whether the primitive's vertices move.
   static bool needed(const gltf::Mesh& mesh, const gltf::Primitive& primitive);
   /// Windows that one takes, of 4 components at most: for the memory plan.
   static uint32_t window_count(const gltf::Mesh& mesh, const gltf::Primitive& primitive);

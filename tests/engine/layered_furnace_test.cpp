@@ -13,13 +13,6 @@ namespace {
 
 using namespace testing;
 
-constexpr Vec3 kUp(0, 0, 1);
-
-Vec3 view(float mu, float phi = 0.6f) {
-  const float sine = std::sqrt(1 - mu * mu);
-  return {sine * std::cos(phi), sine * std::sin(phi), mu};
-}
-
 /// Mean weight of draws, one in each cell of the cube of random numbers: what the surface sends out of what comes from
 /// wo. Error about 0.1 % of 1.
 Vec3 albedo(const LayeredSample& m, float mu, float phi = 0.6f) {

@@ -13,13 +13,6 @@ namespace {
 
 using namespace testing;
 
-constexpr Vec3 kUp(0, 0, 1);
-
-Vec3 view(float mu, float phi = 0.6f) {
-  const float sine = std::sqrt(1 - mu * mu);
-  return {sine * std::cos(phi), sine * std::sin(phi), mu};
-}
-
 constexpr int kRows = 24, kColumns = 24;  // equal in cos(theta) and phi
 
 int bin_of(const Vec3& d) {

@@ -8,29 +8,13 @@
 #include <thread>
 #include <vector>
 
+#include "tests/queues/numbered_rays.h"
+
 namespace shoal {
 namespace {
 
-Ray numbered_ray(uint32_t number) {
-  Ray ray;
-  ray.path = number;
-  ray.t = static_cast<float>(number);
-  return ray;
-}
-
-std::vector<uint32_t> drain(TreeletQueues& queues, TreeletId treelet) {
-  std::vector<uint32_t> numbers;
-  RayBatch batch = queues.take(treelet);
-  RayBlock block;
-  while (const uint32_t count = batch.next_block(block)) {
-    for (uint32_t i = 0; i < count; ++i) {
-      EXPECT_EQ(block.rays[i].t, static_cast<float>(block.rays[i].path));
-      numbers.push_back(block.rays[i].path);
-    }
-  }
-  std::sort(numbers.begin(), numbers.end());
-  return numbers;
-}
+using testing::drain;
+using testing::numbered_ray;
 
 TEST(RayOutbox, BringsEveryRayOnceToTheQueueItWasSentTo) {
   constexpr uint32_t kTreelets = 200, kRays = 5000;

@@ -2,6 +2,7 @@
 // Header only; for targets that link the engine.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,14 @@ inline const LobeTables& lobe_tables() {
   static const AnisotropyTable anisotropy;
   static const LobeTables tables{&energy, &glass, &sheen, &anisotropy};
   return tables;
+}
+
+inline constexpr Vec3 kUp(0, 0, 1);
+
+/// A unit vector at a cosine and an azimuth to kUp.
+inline Vec3 view(float mu, float phi = 0.6f) {
+  const float sine = std::sqrt(1 - mu * mu);
+  return {sine * std::cos(phi), sine * std::sin(phi), mu};
 }
 
 struct LayeredCase {
