@@ -8,6 +8,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "io/gltf_json.h"
+
 namespace shoal {
 namespace {
 
@@ -79,7 +81,7 @@ bool keep_common(ChannelMap& from, const ChannelMap& other, const char* which, I
       ++it;
       continue;
     }
-    diff.notes.push_back(fmt::format("channel {} is in the {} picture only", it->first, which));
+    diff.notes.push_back(fmt::format("channel {} is in the {} picture only", gltf::printable(it->first), which));
     it = from.erase(it);
     same = false;
   }
@@ -147,7 +149,7 @@ nlohmann::ordered_json channel_json(const ChannelDiff& channel) {
 std::string channel_text(const ChannelDiff& channel) {
   return fmt::format(
       "{:<16} max abs {:.3e}  max rel {:.3e}  mean {:+.3e}  rmse {:.3e}  relMSE {:.3e}  differing {}{}",
-      channel.name, channel.max_absolute, channel.max_relative, channel.mean, channel.rmse, channel.relative_mse,
+      gltf::printable(channel.name), channel.max_absolute, channel.max_relative, channel.mean, channel.rmse, channel.relative_mse,
       channel.differing_count,
       channel.non_finite_count ? fmt::format("  not finite {}", channel.non_finite_count) : std::string());
 }
@@ -184,7 +186,7 @@ std::string diff_text(const ImageDiff& diff) {
   text += fmt::format("\n  {} of {} pixels differ", diff.differing_pixels_count, diff.pixels_count);
   if (diff.first.found) {
     text += fmt::format("; the first at ({}, {}), channel {}: {} and {}", diff.first.x, diff.first.y,
-                        diff.first.channel, diff.first.a, diff.first.b);
+                        gltf::printable(diff.first.channel), diff.first.a, diff.first.b);
   }
   if (std::any_of(diff.channels.begin(), diff.channels.end(), [](const auto& c) { return c.name == "R"; })) {
     text += "\n  " + channel_text(diff.color);

@@ -1,9 +1,12 @@
 #include "engine/measure_images.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 
 #include "engine/tile_textures.h"
+#include "io/jpeg_image.h"
 #include "io/webp_image.h"
 
 namespace shoal {
@@ -61,7 +64,33 @@ Result<EncodedHead> read_head(FileSystem& fs, gltf::BufferFiles& files, const gl
   return head;
 }
 
+Status check_header(const EncodedHead& head, const ImageHeader& header, const std::string& name, uint64_t most_pixels) {
+  if (head.encoded_bytes > kMaxEncodedImageBytes) {
+    return Error{ErrorCode::kInput, fmt::format("{}: expected at most {} encoded bytes, found {}", name,
+                                                kMaxEncodedImageBytes, head.encoded_bytes)};
+  }
+  const uint64_t pixels = uint64_t{header.width} * header.height;
+  if (pixels == 0 && !is_jpeg(head.bytes)) {
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: expected a PNG, a JPEG or a WebP, found another format or no size", name)};
+  }
+  if (pixels > most_pixels) {
+    return Error{ErrorCode::kInput, fmt::format("{}: expected at most {} pixels, found {} x {}", name, most_pixels,
+                                                header.width, header.height)};
+  }
+  if (std::max(header.width, header.height) > kMaxTextureSide) {
+    return Error{ErrorCode::kInput, fmt::format("{}: expected 1 to {} texels a side, found {} x {}", name,
+                                                kMaxTextureSide, header.width, header.height)};
+  }
+  return {};
+}
+
 }  // namespace
+
+Error image_error(const gltf::Document& document, const TextureRequest& request, const Error& error) {
+  return {error.code, fmt::format("{}: images[{}] ({}), used by {}: {}", document.path, request.image,
+                                  document.images[request.image].name, request.user, error.message)};
+}
 
 ImageHeader read_image_header(std::span<const std::byte> bytes) {
   constexpr unsigned char kPng[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
@@ -80,12 +109,14 @@ Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, cons
                                   const std::vector<TextureRequest>& requests, uint64_t most_pixels) {
   ImageNeeds needs;
   for (size_t r = 0; r < requests.size(); ++r) {
-    const auto head = read_head(fs, files, document, document.images[requests[r].image]);
-    if (!head.ok() && head.error().code == ErrorCode::kStorage) return head.error();
-    if (!head.ok()) continue;  // reading the texture says what is wrong with it
+    const gltf::Image& image = document.images[requests[r].image];
+    const auto head = read_head(fs, files, document, image);
+    if (!head.ok()) return image_error(document, requests[r], head.error());
     const ImageHeader header = read_image_header(head.value().bytes);
+    if (const Status status = check_header(head.value(), header, image.name, most_pixels); !status.ok()) {
+      return image_error(document, requests[r], status.error());
+    }
     const uint64_t pixels = uint64_t{header.width} * header.height;
-    if (pixels > most_pixels) continue;  // refused when it is read
     // The encoded bytes are there twice while a file is read.
     needs.largest_bytes =
         std::max(needs.largest_bytes, pixels * kImageScratchBytesPerPixel + 2 * head.value().encoded_bytes);

@@ -15,10 +15,14 @@ struct ImageNeeds {
   uint64_t coverage_bytes = 0;  ///< alpha of all levels, kept until the treelets are built
 };
 
-/// Images that cannot be read or whose header is not understood count for nothing here: engine/tile_textures refuses
-/// them, or those above `most_pixels` or above the pixels that the plan leaves. Fails with: kStorage.
+/// Before anything of size is read or written. Fails with: kInput (an image is missing, of another format, or above
+/// `most_pixels` by its header, named with the material that uses it), kStorage. What is broken behind its header, and a
+/// JPEG whose size is not found, count for nothing here: engine/tile_textures refuses them.
 Result<ImageNeeds> measure_images(FileSystem& fs, gltf::BufferFiles& files, const gltf::Document& document,
                                   const std::vector<TextureRequest>& requests, uint64_t most_pixels);
+
+/// Says which image and which material `error` is about.
+Error image_error(const gltf::Document& document, const TextureRequest& request, const Error& error);
 
 struct ImageHeader {
   uint32_t width = 0, height = 0;

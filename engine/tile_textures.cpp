@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <cstring>
 
+#include "engine/measure_images.h"
 #include "engine/mip_pyramid.h"
 
 namespace shoal {
 
 namespace {
-
-constexpr uint64_t kMaxEncodedImageBytes = 1u << 30;
-constexpr uint32_t kMaxTextureSide = 1u << (kMaxTextureLevels - 1);
 
 Result<std::vector<std::byte>> encoded_image(FileSystem& fs, gltf::BufferFiles& files,
                                              const gltf::Document& document, const gltf::Image& image) {
@@ -93,11 +91,7 @@ class TextureTiler {
     const TextureRequest& first = requests_[of_image.front()];
     const gltf::Image& source = document_.images[first.image];
     auto decoded = decode(source);
-    if (!decoded.ok()) {
-      return Error{decoded.error().code,
-                   fmt::format("{}: images[{}] ({}), used by {}: {}", document_.path, first.image, source.name,
-                               first.user, decoded.error().message)};
-    }
+    if (!decoded.ok()) return image_error(document_, first, decoded.error());
     Image8 image = std::move(decoded).value();
     std::vector<uint32_t> encoded[2];
     for (const uint32_t r : of_image) encoded[requests_[r].srgb].push_back(r);

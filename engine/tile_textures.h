@@ -17,6 +17,8 @@ inline constexpr uint32_t kTextureTileBytes = kTextureTileTexels * kTextureTileT
 /// Of an image while it is decoded, filtered and tiled: 4 decoded, 4 a copy for a second encoding, 4 + 1 float
 /// levels, rounded up.
 inline constexpr uint64_t kImageScratchBytesPerPixel = 15;
+inline constexpr uint64_t kMaxEncodedImageBytes = 1u << 30;
+inline constexpr uint32_t kMaxTextureSide = 1u << (kMaxTextureLevels - 1);
 
 struct TiledTextures {
   std::vector<Texture> textures;    ///< parallel to the requests

@@ -197,7 +197,7 @@ class Decompressor {
       return Error{ErrorCode::kInput, fmt::format("{}: expected a multiple of 3 indices, found {}", place, corners)};
     }
     SHOAL_ASSIGN_OR_RETURN(const auto packed, read_packed(view.buffer, view.byte_offset, view.byte_length));
-    return DracoMesh::decode(packed, corners / 3, vertices, place);
+    return DracoMesh::decode(packed, corners / 3, vertices, use.accessors.size(), place);
   }
 
   /// An accessor on what was put at `offset`.

@@ -1,11 +1,12 @@
 #include "io/draco_mesh.h"
 
-#include <draco/compression/decode.h>
-#include <draco/compression/point_cloud/point_cloud_decoder.h>
+#include <draco/compression/mesh/mesh_edgebreaker_decoder.h>
+#include <draco/compression/mesh/mesh_sequential_decoder.h>
 #include <draco/core/varint_decoding.h>
 #include <draco/metadata/metadata_decoder.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <new>
 
@@ -15,16 +16,21 @@ namespace shoal::gltf {
 
 namespace {
 
-/// Of an edgebreaker decoder, a triangle (faces, corner tables, traversal) and a vertex and attribute (the value, its
-/// portable form, predictions and maps). Meshes with three attributes were seen to take 0.1 to 0.8 of it.
-constexpr uint64_t kTriangleBytes = 160, kValueBytes = 44;
+/// Of an edgebreaker decoder, a triangle (faces, corner tables, traversal) and a vertex and attribute: the value and its
+/// portable form of four bytes, of each component, and maps. Meshes with three attributes were seen to take 0.1 to 0.8
+/// of it.
+constexpr uint64_t kTriangleBytes = 160, kPortableBytes = 4, kMapBytes = 12;
+constexpr uint64_t kValueBytes = 4 * (sizeof(float) + kPortableBytes) + kMapBytes;
+static_assert(kValueBytes == 44);
 
 struct Sizes {
   uint64_t triangles = 0, vertices = 0;
+  uint64_t seam_tables = 0;  ///< corner tables of attributes with seams of their own: edgebreaker only
+  bool sequential = false;
 };
 
 /// What the stream's connectivity says of its size: Draco takes memory for it at once. Follows the bitstream
-/// specification, version 2.2, sections "Draco decoder" and "Connectivity decoder".
+/// specification, version 2.2, sections "Draco decoder", "Sequential" and "EdgeBreaker connectivity decoder".
 std::optional<Sizes> peek_sizes(std::span<const std::byte> packed) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(packed.data()), packed.size());
@@ -41,12 +47,54 @@ std::optional<Sizes> peek_sizes(std::span<const std::byte> packed) {
   uint32_t first = 0, second = 0;
   if (header.encoder_method == draco::MESH_SEQUENTIAL_ENCODING) {
     if (!draco::DecodeVarint(&first, &buffer) || !draco::DecodeVarint(&second, &buffer)) return std::nullopt;
-    return Sizes{first, second};
+    return Sizes{first, second, 0, true};
   }
-  uint8_t traversal = 0;
+  uint8_t traversal = 0, seam_tables = 0;
   if (!buffer.Decode(&traversal)) return std::nullopt;
   if (!draco::DecodeVarint(&first, &buffer) || !draco::DecodeVarint(&second, &buffer)) return std::nullopt;
-  return Sizes{second, first};
+  if (!buffer.Decode(&seam_tables)) return std::nullopt;
+  return Sizes{second, first, seam_tables, false};
+}
+
+/// One of Draco's decoders, stopped where vertices are counted and attributes described, but none has memory yet.
+template <class Method>
+class BoundedDecoder final : public Method {
+ public:
+  BoundedDecoder(uint64_t vertices, uint64_t attributes) : vertices_(vertices), attributes_(attributes) {}
+  /// What was found instead; empty if that was not the matter.
+  const std::string& refused() const { return refused_; }
+
+ private:
+  bool DecodeAllAttributes() override {
+    const draco::PointCloud& cloud = *this->point_cloud();
+    uint64_t bytes = 0;
+    for (int32_t i = 0; i < cloud.num_attributes(); ++i) {
+      const draco::PointAttribute& attribute = *cloud.attribute(i);
+      const auto length = static_cast<uint64_t>(std::max(0, draco::DataTypeLength(attribute.data_type())));
+      bytes += static_cast<uint8_t>(attribute.num_components()) * (length + kPortableBytes) + kMapBytes;
+    }
+    if (cloud.num_points() != vertices_) {
+      refused_ = fmt::format("{} vertices", cloud.num_points());
+    } else if (bytes > attributes_ * kValueBytes) {
+      refused_ = fmt::format("{} attributes that take {} bytes a vertex", cloud.num_attributes(), bytes);
+    }
+    return refused_.empty() && Method::DecodeAllAttributes();
+  }
+
+  uint64_t vertices_, attributes_;
+  std::string refused_;
+};
+
+/// The message of what is wrong; empty if nothing is.
+template <class Method>
+std::string decode_bounded(std::span<const std::byte> packed, uint64_t vertices, uint64_t attributes,
+                           draco::Mesh& mesh) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(packed.data()), packed.size());
+  BoundedDecoder<Method> decoder(vertices, attributes);
+  const draco::Status status = decoder.Decode(draco::DecoderOptions(), &buffer, &mesh);
+  if (status.ok()) return {};
+  return decoder.refused().empty() ? printable(status.error_msg_string()) : decoder.refused();
 }
 
 template <class T>
@@ -87,28 +135,27 @@ DracoMesh::DracoMesh(DracoMesh&&) noexcept = default;
 DracoMesh::~DracoMesh() = default;
 
 Result<DracoMesh> DracoMesh::decode(std::span<const std::byte> packed, uint64_t triangles, uint64_t vertices,
-                                    const std::string& place) {
+                                    uint64_t attributes, const std::string& place) {
   const auto wrong = [&](const std::string& found) {
-    return Error{ErrorCode::kInput, fmt::format("{}: expected a Draco mesh (bitstream 2.2) of {} triangles and {} "
-                                                "vertices, found {}", place, triangles, vertices, found)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: expected a Draco mesh (bitstream 2.2) of {} triangles and {} vertices, {} attributes of "
+                             "at most {} bytes a vertex in all, found {}",
+                             place, triangles, vertices, attributes, attributes * kValueBytes, found)};
   };
   try {
     const auto sizes = peek_sizes(packed);
     if (!sizes) return wrong("another format, or too few bytes");
     if (sizes->triangles != triangles || sizes->vertices > vertices) {
-      return wrong(fmt::format("{} and {}", sizes->triangles, sizes->vertices));
+      return wrong(fmt::format("{} triangles and {} vertices", sizes->triangles, sizes->vertices));
     }
-    draco::DecoderBuffer buffer;
-    buffer.Init(reinterpret_cast<const char*>(packed.data()), packed.size());
-    draco::Decoder decoder;
-    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-    if (!decoded.ok()) return wrong(printable(decoded.status().error_msg_string()));
+    if (sizes->seam_tables > attributes) return wrong(fmt::format("seams of {} attributes", sizes->seam_tables));
     auto state = std::make_unique<State>();
-    state->mesh = std::move(decoded).value();
+    state->mesh = std::make_unique<draco::Mesh>();
     state->place = place;
-    if (state->mesh->num_faces() != triangles || state->mesh->num_points() != vertices) {
-      return wrong(fmt::format("{} and {}", state->mesh->num_faces(), state->mesh->num_points()));
-    }
+    const auto decode = sizes->sequential ? decode_bounded<draco::MeshSequentialDecoder>
+                                          : decode_bounded<draco::MeshEdgebreakerDecoder>;
+    if (const std::string found = decode(packed, vertices, attributes, *state->mesh); !found.empty()) return wrong(found);
+    if (state->mesh->num_faces() != triangles) return wrong(fmt::format("{} triangles", state->mesh->num_faces()));
     return DracoMesh(std::move(state));
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kMemoryCap, fmt::format("{}: no memory to decode a Draco mesh", place)};

@@ -1,7 +1,8 @@
 // A mesh of KHR_draco_mesh_compression, decoded whole, for io/decompress_document; Draco stays inside the .cpp. Thread
-// rule: one thread. Memory: at most memory_bytes() for a stream that keeps to its header; a hostile one, whose
-// attributes are wider or more than its document says, takes a multiple before it is refused (up to 46 times an
-// attribute).
+// rule: one thread. Memory: at most memory_bytes(), whatever attributes a stream has: what it says of its triangles,
+// vertices and attributes is read, and refused, before memory is taken for them. Not bounded by it is what Draco takes of
+// itself for a stream's descriptions and tables of symbols before it sees that they are wrong: up to 512 bytes a
+// compressed byte.
 #pragma once
 
 #include <memory>
@@ -14,10 +15,11 @@ namespace shoal::gltf {
 
 class DracoMesh {
  public:
-  /// Refuses, before it is decoded, what does not have `triangles` triangles and at most `vertices` vertices, so that no
-  /// stream takes more than its document says. `place` is for messages. Fails with: kInput, kMemoryCap.
+  /// Refuses, before it is decoded, what does not have `triangles` triangles and `vertices` vertices, and attributes that
+  /// take more than `attributes` of four components would, so that no stream takes more than its document says. `place`
+  /// is for messages. Fails with: kInput, kMemoryCap.
   static Result<DracoMesh> decode(std::span<const std::byte> packed, uint64_t triangles, uint64_t vertices,
-                                  const std::string& place);
+                                  uint64_t attributes, const std::string& place);
   DracoMesh(DracoMesh&&) noexcept;
   ~DracoMesh();
 

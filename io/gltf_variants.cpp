@@ -6,6 +6,11 @@
 #include "io/gltf_sections.h"
 
 namespace shoal::gltf {
+namespace {
+
+constexpr size_t kMaxNamedVariants = 20;  ///< in a message
+
+}  // namespace
 
 void read_variants(const JsonNode& root, const Limits& limits, Document& document) {
   const JsonNode extension = root.object("extensions").object("KHR_materials_variants");
@@ -36,7 +41,9 @@ Status select_variant(Document& document, const std::string& name) {
   const auto at = std::find(document.variants.begin(), document.variants.end(), name);
   if (at == document.variants.end()) {
     std::string known;
-    for (const std::string& variant : document.variants) known += (known.empty() ? "" : ", ") + printable(variant);
+    const size_t shown = std::min(document.variants.size(), kMaxNamedVariants);
+    for (size_t i = 0; i < shown; ++i) known += (i == 0 ? "" : ", ") + printable(document.variants[i]);
+    if (shown < document.variants.size()) known += fmt::format(" and {} more", document.variants.size() - shown);
     return Error{ErrorCode::kUsage,
                  fmt::format("{}: no variant '{}': {}", document.path, printable(name),
                              known.empty() ? "the scene has none" : "expected one of " + known)};

@@ -161,6 +161,32 @@ TEST(CompressedGeometry, AnInstancedPackedMeshIsDecodedOnceForAllItsPlaces) {
   EXPECT_EQ(built.report.triangles_count, g.indices.size() / 3);
 }
 
+TEST(CompressedGeometry, AnImageThatIsNotThereIsRefusedBeforeAnythingIsDecoded) {
+  MemoryFileSystem fs;
+  save_meshopt(fs, grid());
+  const std::vector<std::byte> text = fs.contents("scene.gltf");
+  Json json = Json::parse(std::string(reinterpret_cast<const char*>(text.data()), text.size()));
+  json["images"] = {{{"uri", "wall.png"}}};
+  json["textures"] = {{{"source", 0}}};
+  json["materials"] = {{{"name", "wall"}, {"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}}}}};
+  json["meshes"][0]["primitives"][0]["material"] = 0;
+  fs.put("scene.gltf", json.dump());
+  std::string stages;
+  SceneBuildOptions options;
+  options.progress = [&](const BuildProgress& progress) { stages += std::string(progress.stage) + " "; };
+  const std::string huge("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x7f\0\0\0\x7f\0\0\0\x08\x06\0\0\0", 29);
+  for (const std::string& bytes : {std::string(), std::string("not a picture"), huge, huge.substr(0, 20)}) {
+    if (!bytes.empty()) fs.put("wall.png", bytes);
+    stages.clear();
+    const std::string message = build_error(fs, ErrorCode::kInput, options);
+    EXPECT_THAT(message, HasSubstr("images[0] (wall.png), used by"));
+    EXPECT_EQ(stages, "reading reading ");
+  }
+  fs.put("wall.png", png_bytes(1, 1, {255, 255, 255, 255}));
+  EXPECT_EQ(build_and_open(fs, options).report.triangles_count, grid().indices.size() / 3);
+  EXPECT_THAT(stages, HasSubstr("decompressing"));
+}
+
 TEST(CompressedGeometry, ACapTooSmallForAMeshNamesTheOneThatWorks) {
   Grid g = grid();
   // Many vertices in one compressed view, of which few are drawn: decoding is what takes most.

@@ -143,6 +143,13 @@ TEST(ConvertLayers, AVariantChangesTheMaterialsOfItsPrimitivesAndStaysInTheRecor
   const std::string message = build_error(written.fs, ErrorCode::kUsage, options);
   EXPECT_NE(message.find("no variant 'noon'"), std::string::npos) << message;
   EXPECT_NE(message.find("night, day, late night"), std::string::npos) << message;
+  auto& variants = written.scene.json["extensions"]["KHR_materials_variants"]["variants"];
+  for (int i = 0; i < 110; ++i) variants.push_back({{"name", std::string(200, 'x')}});
+  written.scene.save(written.fs);
+  const std::string many = build_error(written.fs, ErrorCode::kUsage, options);
+  EXPECT_NE(many.find("night, day, late night, xx"), std::string::npos) << many;
+  EXPECT_NE(many.find(" and 93 more"), std::string::npos) << many;
+  EXPECT_LT(many.size(), 3000u);
   const auto plain = build_cache_key(written.fs, "scene.gltf", {});
   options.variant = "day";
   const auto day = build_cache_key(written.fs, "scene.gltf", options);

@@ -45,6 +45,19 @@ TEST(ImageDiff, IntegersAreComparedAsSuch) {
   EXPECT_TRUE(diff.first.found);
 }
 
+TEST(ImageDiff, NamesOfChannelsAreMadePrintableBeforeTheyAreShown) {
+  const std::string bell = "R\x1b]0;title\x07", line = "G\nidentical: 2 pixels";
+  const ExrImage a = picture(2, 1, {bell, line});
+  ExrImage b = picture(2, 1, {bell});
+  b.channels[0].values[0] = 7;
+  const ImageDiff diff = diff_images(a, b);
+  const std::string text = diff_text(diff);
+  EXPECT_NE(text.find("channel R?]0;title?: "), std::string::npos) << text;
+  EXPECT_NE(text.find("channel G?identical: 2 pixels is in the first picture only"), std::string::npos) << text;
+  EXPECT_EQ(text.find_first_of("\x1b\x07"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(diff_json(diff))["channels"][0]["name"], bell);  // escaped there
+}
+
 TEST(ImageDiff, OneBitIsADifferenceAndIsFound) {
   const ExrImage a = picture(4, 3, {"R", "G", "B"});
   ExrImage b = a;

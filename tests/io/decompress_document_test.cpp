@@ -1,5 +1,6 @@
 #include "io/decompress_document.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,6 +19,7 @@ using shoal::testing::pack_sequence;
 using shoal::testing::pack_triangles;
 using shoal::testing::pack_vertices;
 using shoal::testing::PackedDraco;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 constexpr uint32_t kGrid = 40;  // quads a side
@@ -300,13 +302,34 @@ TEST(Decompress, RefusesDracoMeshesOfOtherSizesThanTheDocumentSays) {
   EXPECT_THAT(error_of(fewer), HasSubstr("vertices"));
   GltfScene wide = draco_scene(packed);
   wide.root["accessors"][2]["type"] = "VEC3";
-  wide.root["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", 0}, {"NORMAL", 2}};
+  wide.root["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", 0}, {"NORMAL", 2}, {"_N", 1}};
   wide.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"] = {
-      {"POSITION", packed.position_id}, {"NORMAL", packed.uv_id}};
+      {"POSITION", packed.position_id}, {"NORMAL", packed.uv_id}, {"_N", packed.normal_id}};
   EXPECT_THAT(error_of(wide), HasSubstr("components"));
   GltfScene nameless = draco_scene(packed);
   nameless.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["NORMAL"] = 77;
   EXPECT_THAT(error_of(nameless), HasSubstr("attribute 77"));
+}
+
+/// The bytes of the values are cut off: what is refused for its attributes never came to decode them.
+TEST(Decompress, RefusesDracoAttributesBeyondTheDocumentBeforeTheyAreDecoded) {
+  for (const bool sequential : {false, true}) {
+    for (const std::vector<uint32_t>& hidden : {std::vector<uint32_t>{100}, std::vector<uint32_t>(40, 1)}) {
+      DracoSource source = grid_source();
+      source.sequential = sequential;
+      source.hidden_components = hidden;
+      PackedDraco packed = pack_draco(source);
+      GltfScene whole = draco_scene(packed);
+      EXPECT_THAT(error_of(whole), HasSubstr("bytes a vertex in all, found")) << sequential << hidden.size();
+      packed.bytes.resize(packed.bytes.size() * 3 / 4);
+      EXPECT_THAT(error_of(draco_scene(packed)),
+                  AnyOf(HasSubstr(fmt::format("found {} attributes", 3 + hidden.size())), HasSubstr("found seams of 42")));
+    }
+  }
+  // One of a component beside the document's fits into what is planned for these.
+  DracoSource source = grid_source();
+  source.hidden_components = {1};
+  EXPECT_EQ(error_of(draco_scene(pack_draco(source))), "");
 }
 
 TEST(Decompress, RefusesDracoBytesCutShortOrOfSomethingElse) {

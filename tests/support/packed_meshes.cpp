@@ -63,6 +63,9 @@ PackedDraco pack_draco(const DracoSource& source) {
   const int normal =
       source.normals.empty() ? -1 : add_attribute(mesh, draco::GeometryAttribute::NORMAL, source.normals, 3);
   const int uv = source.uvs.empty() ? -1 : add_attribute(mesh, draco::GeometryAttribute::TEX_COORD, source.uvs, 2);
+  for (const uint32_t components : source.hidden_components) {
+    add_attribute(mesh, draco::GeometryAttribute::GENERIC, std::vector<float>(mesh.num_points() * components), components);
+  }
   for (size_t i = 0; i + 2 < source.indices.size(); i += 3) {
     draco::Mesh::Face face;
     for (size_t k = 0; k < 3; ++k) face[k] = draco::PointIndex(source.indices[i + k]);

@@ -18,6 +18,8 @@ struct DracoSource {
   std::vector<uint32_t> indices;
   bool sequential = false;  ///< else edgebreaker
   int quantization_bits = 0;  ///< of positions; 0: exact
+  /// Of attributes that no document speaks of: floats, all zero.
+  std::vector<uint32_t> hidden_components = {};
 };
 struct PackedDraco {
   std::string bytes;
