@@ -5,6 +5,21 @@ namespace {
 
 constexpr float kInversePi = 0.31830988618379067f;
 
+/// Set by tests/engine/principled_reference_test.cpp alone, for the formulas of the pictures it compares with: diffuse
+/// light that gloss takes nothing from, with the retro-reflection of Burley 2015 ("Extending the Disney BRDF to a BSDF
+/// with Integrated Subsurface Scattering", section 2.1, the factors of 2012), and gloss that keeps no energy.
+#ifdef SHOAL_PRINCIPLED
+constexpr bool kPrincipled = true;
+#else
+constexpr bool kPrincipled = false;
+#endif
+
+/// Burley 2012, "Physically-Based Shading at Disney", section 5.3: over base colour / pi.
+float retro_reflection(float roughness, float cosine_d, float cosine_i, float cosine_o) {
+  const float grazing = 2 * roughness * cosine_d * cosine_d - 0.5f;
+  return (1 + grazing * power5(1 - cosine_i)) * (1 + grazing * power5(1 - cosine_o));
+}
+
 }  // namespace
 
 Bsdf::Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3& geometric_normal,
@@ -27,7 +42,7 @@ float Bsdf::set_specular(const MaterialSample& material, const EnergyTable& tabl
   lambda_o_ = ggx_.lambda(wo_);
 
   const SpecularAlbedo e = table.albedo(std::min(wo_.z, 1.0f), ggx_.alpha);
-  const float lost = std::max(0.0f, 1 - e.total()) / e.total();
+  const float lost = kPrincipled ? 0.0f : std::max(0.0f, 1 - e.total()) / e.total();
   const Vec3 f0_dielectric =
       glm::min(material.dielectric_f0 * material.specular_color, Vec3(1)) * material.specular;
   const Vec3 gain_dielectric = 1.0f + f0_dielectric * lost, gain_metal = 1.0f + material.base_color * lost;
@@ -35,7 +50,7 @@ float Bsdf::set_specular(const MaterialSample& material, const EnergyTable& tabl
   f90_ = (1 - m) * material.specular * gain_dielectric + m * gain_metal;
 
   const Vec3 dielectric_albedo = (f0_dielectric * e.a + Vec3(material.specular * e.b)) * gain_dielectric;
-  diffuse_ *= std::max(0.0f, 1 - max_component(dielectric_albedo));
+  if (!kPrincipled) diffuse_ *= std::max(0.0f, 1 - max_component(dielectric_albedo));
   return luminance(f0_ * e.a + f90_ * e.b);
 }
 
@@ -46,6 +61,7 @@ BsdfValue Bsdf::evaluate_local(const Vec3& wi) const {
   if (specular_probability_ == 0) return result;
   const Vec3 h = glm::normalize(wo_ + wi);
   const float cosine = std::clamp(glm::dot(wo_, h), 0.0f, 1.0f);
+  if (kPrincipled) result.value *= retro_reflection(std::sqrt(ggx_.alpha), cosine, wi.z, wo_.z);
   const float d = ggx_.d(h) / (4 * wo_.z);
   result.value += (f0_ + (f90_ - f0_) * power5(1 - cosine)) * (d / (1 + lambda_o_ + ggx_.lambda(wi)));
   result.pdf += specular_probability_ * (d / (1 + lambda_o_));
