@@ -18,7 +18,12 @@ struct Arguments {
   std::string output, png, preview, stats, tonemap = "pbr-neutral";
   std::vector<std::string> aovs;
   float exposure = 0;
+  double time_limit = 0;
+  bool has_time_limit = false;
 };
+
+/// Of a render that ends by itself, where --spp does not say: as many as a pixel can hold.
+constexpr uint32_t kMostSamples = 1u << 22;
 
 Result<AovSet> aovs_of(const Arguments& arguments) {
   return parse_aovs(fmt::format("{}", fmt::join(arguments.aovs, ",")));
@@ -30,6 +35,9 @@ Status check_arguments(const Arguments& arguments) {
   if (const auto aovs = aovs_of(arguments); !aovs.ok()) return aovs.error();
   if (!std::isfinite(arguments.exposure)) {
     return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
+  }
+  if (arguments.has_time_limit && !(arguments.time_limit > 0 && std::isfinite(arguments.time_limit))) {
+    return Error{ErrorCode::kUsage, fmt::format("--time-limit {}: expected seconds, more than 0", arguments.time_limit)};
   }
   for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
@@ -68,6 +76,8 @@ int run_render(const Arguments& arguments, Console& console) {
   RenderArguments asked = arguments.render;
   asked.picture.aovs = aovs_of(arguments).value();
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
+  asked.execution.time_limit_seconds = arguments.time_limit;
+  if (arguments.has_time_limit && asked.samples->count() == 0) asked.picture.samples = kMostSamples;
   auto prepared = prepare_render(asked, {arguments.render.execution.order}, false, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
@@ -79,6 +89,7 @@ int run_render(const Arguments& arguments, Console& console) {
   if (!result.ok()) return console.error(result.error());
   const Status written = write_outputs(arguments, p, result.value());
   if (!written.ok()) return console.error(written.error());
+  if (arguments.has_time_limit) console.info(describe_samples(result.value().samples));
   console.info(fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds));
   if (result.value().counters.invalid_samples_count > 0) {
     console.warning(fmt::format("{} contributions were not finite and were dropped",
@@ -110,7 +121,13 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
       ->type_name("NAMES");
   add_choice(*sub, "--order", arguments->render.execution.order, order_choices(), " (the picture is the same)")
       ->type_name("ORDER");
-  sub->callback([arguments, &console, &command] {
+  const CLI::Option* time_limit =
+      sub->add_option("--time-limit", arguments->time_limit,
+                      "seconds after which rendering ends, with the samples that fit; --spp is the most then (default: no "
+                      "bound). The picture is that of --spp N for the N that is printed")
+          ->type_name("SECONDS");
+  sub->callback([arguments, time_limit, &console, &command] {
+    arguments->has_time_limit = time_limit->count() > 0;
     command = [arguments, &console] { return run_render(*arguments, console); };
   });
 }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -58,15 +59,22 @@ int Console::error(const Error& error) {
 }
 
 void Console::show_progress(std::string_view stage, double fraction, double seconds, std::string_view detail) {
+  std::optional<double> left;
+  if (fraction > 0) left = seconds * (1 - fraction) / fraction;
+  show_progress(stage, fraction, seconds, detail, left);
+}
+
+void Console::show_progress(std::string_view stage, double fraction, double seconds, std::string_view detail,
+                            std::optional<double> seconds_left) {
   ProgressMode mode = progress;
   if (mode == ProgressMode::kAuto) mode = isatty(STDERR_FILENO) != 0 ? ProgressMode::kBar : ProgressMode::kLines;
   if (mode == ProgressMode::kNone) return;
-  const double left = fraction > 0 ? seconds * (1 - fraction) / fraction : 0;
+  const std::string left = seconds_left ? time_left_text(*seconds_left) : "";
   std::lock_guard guard(mutex_);
   if (mode == ProgressMode::kBar) {
     const int filled = static_cast<int>(fraction * 30);
-    fmt::print(stderr, "\r{:<9}[{:=<{}}{:{}}] {:5.1f} %  {} left  {} MB  {}\x1b[K", stage, "", filled, "", 30 - filled,
-               fraction * 100, clock_text(left), resident_set_bytes() >> 20, detail);
+    fmt::print(stderr, "\r{:<9}[{:=<{}}{:{}}] {:5.1f} %  {}{}{} MB  {}\x1b[K", stage, "", filled, "", 30 - filled,
+               fraction * 100, left, left.empty() ? "" : "  ", resident_set_bytes() >> 20, detail);
     bar_open_ = true;
     std::fflush(stderr);
     return;
@@ -77,12 +85,13 @@ void Console::show_progress(std::string_view stage, double fraction, double seco
     print_json({{"stage", stage},
                 {"fraction", fraction},
                 {"seconds", seconds},
-                {"seconds_left", left},
+                {"seconds_left", seconds_left ? nlohmann::ordered_json(*seconds_left) : nlohmann::ordered_json(nullptr)},
                 {"rss_bytes", resident_set_bytes()},
                 {"detail", detail}});
   } else {
-    fmt::print(stderr, "{} {:>6} MB | {} {:.1f} %, {} left{}{}\n", clock_text(seconds_since_start()),
-               resident_set_bytes() >> 20, stage, fraction * 100, clock_text(left), detail.empty() ? "" : ", ", detail);
+    fmt::print(stderr, "{} {:>6} MB | {} {:.1f} %{}{}{}{}\n", clock_text(seconds_since_start()),
+               resident_set_bytes() >> 20, stage, fraction * 100, left.empty() ? "" : ", ", left,
+               detail.empty() ? "" : ", ", detail);
   }
 }
 
@@ -91,6 +100,14 @@ void Console::end_progress() {
   if (bar_open_) std::fputs("\n", stderr);
   bar_open_ = false;
   last_line_seconds_ = -1e9;
+}
+
+std::string time_left_text(double seconds) {
+  if (seconds < 9.5) return fmt::format("about {:.0f} s left", std::ceil(seconds));
+  if (seconds < 95) return fmt::format("about {:.0f} s left", 5 * std::round(seconds / 5));
+  if (seconds < 95 * 60) return fmt::format("about {:.0f} min left", seconds / 60);
+  const double hours = seconds / 3600;
+  return fmt::format("about {:.{}f} h left", hours, hours < 10 ? 1 : 0);
 }
 
 }  // namespace shoal

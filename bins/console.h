@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -25,7 +26,11 @@ class Console {
   /// Prints the error and returns its exit code.
   int error(const Error& error);
 
-  /// `fraction` of `stage` done; `detail` such as "1.2 Mrays/s, 3 GiB read". Remaining time is worked out here.
+  /// `fraction` of `stage` done; `detail` such as "1.2 Mrays/s, 3 GiB read"; how long it will take still, as far as that
+  /// can be told.
+  void show_progress(std::string_view stage, double fraction, double seconds, std::string_view detail,
+                     std::optional<double> seconds_left);
+  /// The same; the remaining time is worked out from what is done.
   void show_progress(std::string_view stage, double fraction, double seconds, std::string_view detail);
   /// Ends the bar's line, if there is one.
   void end_progress();
@@ -36,5 +41,8 @@ class Console {
   bool bar_open_ = false;
   double last_line_seconds_ = -1e9;
 };
+
+/// "about 40 s left", "about 3 min left", "about 2.5 h left".
+std::string time_left_text(double seconds);
 
 }  // namespace shoal

@@ -216,7 +216,7 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("scene", scene, "scene: .gltf, .glb (built first where needed) or .shoal")->required();
   app.add_option("--width", picture.width, "picture width in pixels")->capture_default_str();
   app.add_option("--height", picture.height, "picture height in pixels")->capture_default_str();
-  app.add_option("--spp", picture.samples, "samples a pixel")->capture_default_str();
+  samples = app.add_option("--spp", picture.samples, "samples a pixel")->capture_default_str();
   app.add_option("--bounces", picture.shading.bounces, "scattering events of a path at most")->capture_default_str();
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   declare_lens(app, picture);
@@ -342,12 +342,11 @@ RenderHooks console_hooks(Console& console) {
   RenderHooks hooks;
   hooks.stop = stop_on_signals();
   hooks.progress = [&console](const RenderProgress& p) {
-    const double fraction = static_cast<double>(p.samples_done) / static_cast<double>(p.samples_total);
     std::string detail = fmt::format("{:.2f} M samples/s, {} read",
                                      static_cast<double>(p.samples_done) / p.seconds * 1e-6,
                                      format_bytes(p.disk_read_bytes));
     if (p.first_picture) detail += fmt::format(", first picture after {:.2f} s", p.first_picture->seconds);
-    console.show_progress("rendering", fraction, p.seconds, detail);
+    console.show_progress("rendering", p.fraction, p.seconds, detail, p.seconds_left);
   };
   hooks.warning = [&console](const std::string& message) { console.warning(message); };
   return hooks;
@@ -367,6 +366,10 @@ std::string describe_plan(const MemoryPlan& plan) {
                             format_bytes(plan.geometry_page_bytes), format_bytes(plan.attribute_page_bytes),
                             format_bytes(plan.texture_page_bytes), format_bytes(plan.read_buffer_bytes),
                             format_bytes(plan.scratch_bytes));
+}
+
+std::string describe_samples(const SampleReport& samples) {
+  return fmt::format("{} samples a pixel in {} passes", samples.most, samples.passes_count);
 }
 
 std::string describe_order(const ChosenOrder& chosen) {

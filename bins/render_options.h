@@ -50,6 +50,7 @@ struct RenderArguments {
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false;
   uint32_t more_levels = 32;
+  CLI::Option* samples = nullptr;  ///< --spp
 
   void declare(CLI::App& app);
 };
@@ -71,6 +72,8 @@ const std::atomic<bool>* stop_on_signals();
 RenderHooks console_hooks(Console& console);
 /// The memory plan as one log line.
 std::string describe_plan(const MemoryPlan& plan);
+/// The samples that pixels got, as one log line.
+std::string describe_samples(const SampleReport& samples);
 /// The order that was chosen, and why, as one log line.
 std::string describe_order(const ChosenOrder& chosen);
 std::string describe_plan(const BuildMemoryPlan& plan);

@@ -56,10 +56,10 @@ uint32_t Film::mean(uint32_t pixel, float rgb[3]) const {
   return p.added;
 }
 
-std::vector<float> Film::resolve(uint32_t samples) const {
+std::vector<float> Film::resolve() const {
   std::vector<float> rgba(pixels_.size() * 4);
-  const double scale = samples > 0 ? 1.0 / samples : 0.0;
   for (size_t i = 0; i < pixels_.size(); ++i) {
+    const double scale = pixels_[i].added > 0 ? 1.0 / pixels_[i].added : 0.0;
     for (int c = 0; c < 3; ++c) rgba[i * 4 + c] = static_cast<float>(pixels_[i].rgb[c].to_double() * scale);
     rgba[i * 4 + 3] = static_cast<float>(static_cast<double>(pixels_[i].covered) * scale);
   }

@@ -40,8 +40,9 @@ class Film {
   /// while others add.
   uint32_t mean(uint32_t pixel, float rgb[3]) const;
 
-  /// Mean over `samples`: width * height * 4 floats, RGBA, rows from the top; A is the covered fraction.
-  std::vector<float> resolve(uint32_t samples) const;
+  /// Means of the samples that each pixel has: width * height * 4 floats, RGBA, rows from the top; A is the covered
+  /// fraction. Without samples: 0.
+  std::vector<float> resolve() const;
 
   /// Of a pixel, while nobody adds: the sum of a channel, its samples, and those whose camera ray hit something.
   const FixedPoint128& sum(size_t pixel, int channel) const { return pixels_[pixel].rgb[channel]; }

@@ -2,7 +2,6 @@
 
 #include "engine/aov_film.h"
 #include "engine/clock.h"
-#include "engine/sorted_paths.h"
 
 namespace shoal {
 namespace {
@@ -23,12 +22,12 @@ OrderRunner::OrderRunner(const Scene& scene, const ExecutionOptions& execution, 
     : scene_(scene),
       execution_(execution),
       plan_(plan),
-      first_(choose_before_trials(execution.order, plan, samples)),
+      chosen_(choose_before_trials(execution.order, plan, samples).chosen),
       page_treelets_(treelet_of_pages(scene)),
       batches_(scene.treelets.size()) {}
 
 WaitingWork OrderRunner::waiting_work() const {
-  if (first_.chosen.order != Order::kQueued) return {};
+  if (chosen_.order != Order::kQueued) return {};
   return [this](PageId page) {
     const TreeletId treelet = page_treelets_[page];
     if (treelet == kNoIndex) return PageDemand(kTextureTileWork, kTextureTileDemand);
@@ -36,18 +35,29 @@ WaitingWork OrderRunner::waiting_work() const {
   };
 }
 
-ChosenOrder OrderRunner::run(RenderContext& context) {
-  ChosenOrder chosen = first_.chosen;
-  if (first_.to_be_tried) {
-    try_order(context, chosen.order);
+void OrderRunner::run(RenderContext& context) {
+  if (!tried_) choose(context);
+  context.end_sample = context.samples.count();
+  run_order(context, chosen_.order);
+}
+
+void OrderRunner::choose(RenderContext& context) {
+  const FirstChoice first = choose_before_trials(execution_.order, plan_, context.samples.count());
+  chosen_ = first.chosen;
+  if (first.to_be_tried) {
+    if (context.samples_before == 0) try_order(context, chosen_.order);
     std::vector<OrderTrial> trials;
     for (const Order order : kTriedOrders) trials.push_back(try_order(context, order));
-    chosen = choose_by_trials(trials);
+    chosen_ = choose_by_trials(trials);
+    tried_ = true;
   }
-  if (execution_.order == Order::kAuto && context.hooks.chosen) context.hooks.chosen(chosen);
-  context.end_sample = context.samples.count();
-  run_order(context, chosen.order);
-  return chosen;
+  if (execution_.order == Order::kAuto && context.hooks.chosen && (tried_ || !told_)) context.hooks.chosen(chosen_);
+  told_ = true;
+}
+
+void OrderRunner::release() {
+  queued_.reset();
+  sorted_.reset();
 }
 
 OrderTrial OrderRunner::try_order(RenderContext& context, Order order) {
@@ -67,11 +77,15 @@ OrderTrial OrderRunner::try_order(RenderContext& context, Order order) {
 
 void OrderRunner::run_order(RenderContext& context, Order order) {
   if (context.ended) return;
+  if (order != Order::kQueued) queued_.reset();
+  if (order != Order::kSorted) sorted_.reset();
   if (order == Order::kQueued) {
     run_queued(context);
   } else if (order == Order::kSorted) {
-    SortedPaths paths(scene_.top_tree.bounds(), plan_.paths_in_flight, context.threads);
-    render_sorted(context, paths);
+    if (!sorted_) {
+      sorted_ = std::make_unique<SortedPaths>(scene_.top_tree.bounds(), plan_.paths_in_flight, context.threads);
+    }
+    render_sorted(context, *sorted_);
   } else if (order == Order::kHybrid) {
     render_hybrid(context);
   } else {
@@ -81,7 +95,7 @@ void OrderRunner::run_order(RenderContext& context, Order order) {
 
 void OrderRunner::run_queued(RenderContext& context) {
   const auto treelets = static_cast<uint32_t>(scene_.treelets.size());
-  queued_ = std::make_unique<QueuedPaths>(treelets, plan_.paths_in_flight, context.threads);
+  if (!queued_) queued_ = std::make_unique<QueuedPaths>(treelets, plan_.paths_in_flight, context.threads);
   const std::unique_ptr<DrainPolicy> policy =
       make_drain_policy(execution_.policy, scaled_policy(execution_.policy_options, execution_.paging, treelets,
                                                          plan_.paths_in_flight));
@@ -89,7 +103,6 @@ void OrderRunner::run_queued(RenderContext& context) {
   TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_, loads);
   render_queued(context, *queued_, scheduler, batches_);
   context.cache.finish_loads();  // which ask what waits
-  queued_.reset();
 }
 
 }  // namespace shoal

@@ -24,6 +24,9 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
                  fmt::format("camera {} was asked for, the scene has {}", picture.camera, scene.cameras.size())};
   }
   SHOAL_RETURN_IF_ERROR(check_lens(camera_record(scene, picture), picture.lens));
+  if (!(execution.time_limit_seconds >= 0)) {
+    return Error{ErrorCode::kUsage, fmt::format("a time limit of {} s: must be more than 0", execution.time_limit_seconds)};
+  }
   if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
     return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
                                                 fmt::join(drain_policy_names(), ", "))};
@@ -43,6 +46,18 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
+/// Runs the orders over pass after pass. `samples`: of the first, is what context.samples names; of the last in the end.
+void render_passes(RenderContext& context, PassPlan& passes, SampleOrder& samples, OrderRunner& orders) {
+  for (;;) {
+    orders.run(context);
+    if (context.ended) return;
+    context.end_pass();
+    const SampleSpan span = passes.next(now_seconds() - context.start_seconds);
+    if (span.count() == 0) return;
+    samples = SampleOrder(context.picture.width, context.picture.height, span, context.picture.tile_sample);
+  }
+}
+
 /// What a complete render leaves. Ends the preview, whose memory goes before that of the floats is taken.
 RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::optional<Preview>& preview) {
   const PictureOptions& picture = context.picture;
@@ -55,7 +70,7 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
     context.preview = nullptr;
     preview.reset();
   }
-  result.rgba = context.film.resolve(picture.samples);
+  result.rgba = context.film.resolve();
   if (context.aovs != nullptr) result.layers = context.aovs->resolve(context.film);
   result.counters = context.counters;
   result.plan = plan;
@@ -121,8 +136,9 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const bool lens = (picture.shading.effects.off & kEffectLens) == 0;
   const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens));
   const bool previewed = !execution.preview.path.empty();
-  const SampleOrder samples(picture.width, picture.height, picture.samples, picture.tile_sample,
-                            previewed ? coarse_levels(plan) : 0);
+  PassPlan passes(picture.samples, execution.time_limit_seconds);
+  SampleOrder samples(picture.width, picture.height, passes.next(now_seconds() - start), picture.tile_sample,
+                      previewed ? coarse_levels(plan) : 0);
   Film film(picture.width, picture.height);
   std::unique_ptr<AovFilm> aovs;
   if (!picture.aovs.empty()) {
@@ -142,13 +158,17 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;
   context.aovs = aovs.get();
-  const ChosenOrder chosen = orders.run(context);
+  context.forecast = {samples.pixel_count() * picture.samples, execution.time_limit_seconds};
+  context.forecast.mark(0, now_seconds() - start);
+  render_passes(context, passes, samples, orders);
+  orders.release();
   cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
-  SHOAL_RETURN_IF_ERROR(check_identities(context.counters, samples.count()));
+  SHOAL_RETURN_IF_ERROR(check_identities(context.counters, context.samples_before));
   RenderResult result = finish_result(context, plan, preview);
-  result.order = chosen;
+  result.order = orders.chosen();
+  result.samples = {passes.done(), passes.done(), static_cast<double>(passes.done()), passes.passes_count()};
   take_times(context, start_ticks, result);
   return result;
 }

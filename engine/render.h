@@ -1,6 +1,6 @@
 // Rendering: options, and the orders over the same treelets, pages and kernels.
 // Called by bins and tests. The picture depends on the scene and on PictureOptions only; everything in
-// ExecutionOptions changes time and traffic, never a bit.
+// ExecutionOptions changes time and traffic, never a bit; but for a time limit, which chooses how many samples there are.
 #pragma once
 
 #include <atomic>
@@ -65,6 +65,9 @@ struct ExecutionOptions {
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
   PreviewOptions preview;
+  /// Ends the render when so many seconds have gone by since it began, within a pass (engine/pass_plan.h): with the
+  /// picture of RenderResult::samples samples a pixel. 0: none.
+  double time_limit_seconds = 0;
 };
 
 /// The first preview that was there to be looked at.
@@ -78,6 +81,8 @@ struct RenderProgress {
   uint64_t disk_read_bytes = 0;
   double seconds = 0;
   std::optional<FirstPicture> first_picture;  ///< as soon as there is one; never without a preview
+  double fraction = 0;                 ///< of the work, or of the time limit, that is done: whichever is more
+  std::optional<double> seconds_left;  ///< as far as that can be told yet
 };
 
 struct RenderHooks {
@@ -88,8 +93,16 @@ struct RenderHooks {
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
 };
 
+/// The samples that pixels got.
+struct SampleReport {
+  uint32_t least = 0, most = 0;  ///< of a pixel that is rendered
+  double mean = 0;
+  uint32_t passes_count = 0;     ///< between which all threads waited for the last one
+};
+
 struct RenderResult {
   std::vector<float> rgba;  ///< width * height * 4
+  SampleReport samples;
   std::vector<ExrChannel> layers;  ///< of the AOVs asked for
   RenderCounters counters;
   MemoryPlan plan;

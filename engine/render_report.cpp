@@ -134,6 +134,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
   return {{"width", picture.width},
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
+          {"time_limit_seconds", execution.time_limit_seconds},
           {"camera", picture.camera},
           {"lens", lens_json(scene, picture)},
           {"tile_sample", picture.tile_sample},
@@ -205,7 +206,7 @@ ExrImage picture_image(const RenderResult& result, const Scene& scene, const Pic
   const Matrix to_camera = world_to_camera(camera.camera_to_world);
   image.text["software"] = "Shoal " SHOAL_VERSION;
   image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
-  image.numbers["samplesPerPixel"] = static_cast<float>(picture.samples);
+  image.numbers["samplesPerPixel"] = static_cast<float>(result.samples.mean);
   image.matrices["worldToCamera"] = to_camera;
   const Projection projection = projection_of(record, picture.lens);
   const bool flat = projection == Projection::kPerspective || projection == Projection::kOrthographic;
@@ -234,6 +235,10 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();
   json["render_seconds"] = result.seconds;
   json["picture_share"] = result.picture_share;
+  json["samples"] = {{"mean", result.samples.mean},
+                     {"least", result.samples.least},
+                     {"most", result.samples.most},
+                     {"passes_count", result.samples.passes_count}};
   const auto first = [&](double FirstPicture::* member) {
     return result.first_picture ? Json((*result.first_picture).*member) : Json(nullptr);
   };

@@ -48,6 +48,12 @@ SampleRange RenderContext::begin_samples(uint64_t wanted) {
   return {first, last};
 }
 
+void RenderContext::end_pass() {
+  samples_before += samples_done;
+  next_sample = samples_done = end_sample = 0;
+  forecast.mark(samples_before, now_seconds() - start_seconds);
+}
+
 void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work) {
   tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   tbb::task_arena arena(static_cast<int>(threads));
@@ -270,16 +276,18 @@ void RenderWorker::report_progress() {
     context_.fail({ErrorCode::kStopped, "the render was stopped before it was complete"});
   }
   if (Status failure = context_.cache.failure(); !failure.ok()) context_.fail(std::move(failure).error());
-  if (context_.preview != nullptr && !context_.ended) context_.preview->show_when_due(context_.samples_done);
+  if (context_.preview != nullptr && !context_.ended) context_.preview->show_when_due(context_.all_samples_done());
   if (!context_.hooks.progress) return;
   const double now = now_seconds();
   if (now < next_report_seconds_ || !context_.mutex.try_lock()) return;
   next_report_seconds_ = now + 0.2;
   std::lock_guard guard(context_.mutex, std::adopt_lock);
-  context_.hooks.progress({context_.samples_done, context_.samples.count(),
-                           context_.disk_read_bytes + context_.cache.background_read_bytes(),
-                           now - context_.start_seconds,
-                           context_.preview != nullptr ? context_.preview->first() : std::nullopt});
+  const uint64_t done = context_.all_samples_done();
+  const double seconds = now - context_.start_seconds;
+  context_.hooks.progress({done, context_.forecast.samples_total,
+                           context_.disk_read_bytes + context_.cache.background_read_bytes(), seconds,
+                           context_.preview != nullptr ? context_.preview->first() : std::nullopt,
+                           context_.forecast.fraction(done, seconds), context_.forecast.seconds_left(done, seconds)});
 }
 
 void add_cache_counters(const CacheCounters& cache, RenderCounters& c) {

@@ -7,6 +7,7 @@
 
 #include "engine/camera.h"
 #include "engine/film.h"
+#include "engine/pass_plan.h"
 #include "engine/path_ray.h"
 #include "engine/phase_clock.h"
 #include "engine/ray_group.h"
@@ -32,7 +33,7 @@ struct RenderContext {
   const PictureOptions& picture;
   const ShadingTables& tables;
   const Camera& camera;
-  const SampleOrder& samples;
+  const SampleOrder& samples;  ///< of this pass (engine/pass_plan.h): another between two passes
   const RenderHooks& hooks;
   PageCache& cache;
   Film& film;
@@ -40,8 +41,11 @@ struct RenderContext {
   Preview* preview = nullptr;  ///< or none
   AovFilm* aovs = nullptr;     ///< or none
 
-  /// Samples that begin until the order ends: all, but for trials (engine/order_runner.h). Set while no order runs.
+  /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
+  /// order runs.
   uint64_t end_sample = 0;
+  uint64_t samples_before = 0;  ///< of earlier passes; those below count the pass's own
+  Forecast forecast{};
   std::atomic<uint64_t> next_sample{0};
   std::atomic<uint64_t> samples_done{0};
   std::atomic<uint64_t> disk_read_bytes{0};
@@ -55,6 +59,9 @@ struct RenderContext {
   void fail(Error error);
   /// Takes up to `wanted` samples that nobody has begun; none are left, for now or for good, when it is empty.
   SampleRange begin_samples(uint64_t wanted);
+  /// To be called when all threads have ended a pass: the next counts from 0.
+  void end_pass();
+  uint64_t all_samples_done() const { return samples_before + samples_done; }
   bool may_begin() const { return next_sample.load(std::memory_order_relaxed) < begin_limit(); }
 
  private:

@@ -14,9 +14,13 @@ uint32_t mix(uint32_t value) {
 
 }  // namespace
 
-SampleOrder::SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample,
+SampleOrder::SampleOrder(uint32_t width, uint32_t height, SampleSpan span, uint32_t tile_sample,
                          uint32_t coarse_levels)
-    : width_(width), height_(height), samples_(samples), pixel_count_(uint64_t{width} * height) {
+    : width_(width),
+      height_(height),
+      first_sample_(span.begin),
+      samples_(span.count()),
+      pixel_count_(uint64_t{width} * height) {
   if (tile_sample > 1) leave_out_tiles(tile_sample);
   if (coarse_levels > 0) add_lattices(coarse_levels);
 }
@@ -82,7 +86,7 @@ PixelSample SampleOrder::at_lattice(uint64_t index) const {
                                         [](uint64_t value, const Lattice& l) { return value < l.first; }) - 1;
   const Place place = in_tiles(index - lattice->first, lattice->across, lattice->down);
   const uint32_t x = lattice->x + place.x * lattice->spacing, y = lattice->y + place.y * lattice->spacing;
-  return tiles_.empty() ? PixelSample{x, y, 0} : at_pixel(x, 0);
+  return tiles_.empty() ? PixelSample{x, y, first_sample_} : at_pixel(x, 0);
 }
 
 uint64_t SampleOrder::lattice_index(uint64_t pixel) const {

@@ -7,6 +7,8 @@
 // that one, it names instead the sample displaced at that lattice index (repeated until free), so each sample occurs
 // once.
 //
+// Of every pixel the samples [begin, end) of a span: what a render takes in one pass (engine/pass_plan.h).
+//
 // With `tile_sample` N only one in N tiles is rendered: of every N tiles in that order the one that a fixed hash names,
 // so that they are spread over the picture and the same in every order. Called by engine/render_*. Immutable, any
 // number of threads. Cost: a few divisions, a binary search among the tiles when some are left out, and one among the
@@ -23,11 +25,20 @@ struct PixelSample {
   uint32_t x, y, sample;
 };
 
+/// Samples of a pixel, by number; `end` is not among them.
+struct SampleSpan {
+  uint32_t begin = 0, end = 0;
+  uint32_t count() const { return end - begin; }
+};
+
 class SampleOrder {
  public:
   /// Requires: tile_sample > 0.
   /// `coarse_levels`: how often the picture is gone over with a sample in few pixels, before the rest; 0: never.
-  SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample = 1, uint32_t coarse_levels = 0);
+  SampleOrder(uint32_t width, uint32_t height, SampleSpan span, uint32_t tile_sample = 1, uint32_t coarse_levels = 0);
+  /// The samples [0, samples).
+  SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample = 1, uint32_t coarse_levels = 0)
+      : SampleOrder(width, height, SampleSpan{0, samples}, tile_sample, coarse_levels) {}
   static constexpr uint32_t kAllLevels = 32;  ///< until every pixel has a sample
 
   uint64_t count() const { return pixel_count_ * samples_; }
@@ -85,7 +96,7 @@ class SampleOrder {
             tile_y * kTile + static_cast<uint32_t>(rest / tile_width)};
   }
 
-  /// `pixel` counts those that are rendered.
+  /// `pixel` counts those that are rendered, `sample` those of the span.
   PixelSample at_pixel(uint64_t pixel, uint32_t sample) const {
     if (!tiles_.empty()) {
       const auto tile = std::upper_bound(tiles_.begin(), tiles_.end(), pixel,
@@ -93,10 +104,10 @@ class SampleOrder {
       pixel = tile->pixel + (pixel - tile->first);
     }
     const Place place = in_tiles(pixel, width_, height_);
-    return {place.x, place.y, sample};
+    return {place.x, place.y, first_sample_ + sample};
   }
 
-  uint32_t width_, height_, samples_;
+  uint32_t width_, height_, first_sample_, samples_;
   uint64_t pixel_count_;
   uint64_t first_lattice_count_ = 0, lattices_count_ = 0;  ///< samples
   uint32_t finest_spacing_ = 1;                            ///< of all lattices together

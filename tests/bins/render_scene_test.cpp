@@ -136,6 +136,28 @@ TEST(RenderScene, TheOrderIsChosenUnlessItIsNamedAndSaysWhy) {
   EXPECT_EQ(options["order_reason"], "asked for");
 }
 
+TEST(RenderScene, ATimeLimitSaysHowManySamplesItHadTimeFor) {
+  const TemporaryFolder folder;
+  make_terrain(folder, "2K");
+  const std::vector<std::string> options = {"render", folder / "terrain.shoal", "--width", "24", "--height", "16"};
+  const ProgramRun limited = run_shoal(folder, join(options, {"-o", folder / "limited.exr", "--time-limit", "0.5",
+                                                              "--stats", folder / "out.json"}));
+  expect_exit(limited, 0);
+  const json stats = parsed(file_text(folder / "out.json"));
+  const uint64_t samples = stats["samples"]["most"];
+  EXPECT_EQ(stats["options"]["time_limit_seconds"], 0.5);
+  EXPECT_EQ(stats["samples"]["least"], samples);
+  EXPECT_EQ(stats["samples"]["mean"], static_cast<double>(samples));
+  EXPECT_GE(stats["samples"]["passes_count"], 1);
+  EXPECT_THAT(limited.err, HasSubstr(fmt::format("{} samples a pixel in ", samples)));
+  EXPECT_EQ(read_picture(folder / "limited.exr").numbers.at("samplesPerPixel"), static_cast<float>(samples));
+  const ProgramRun most = run_shoal(folder, join(options, {"-o", folder / "few.exr", "--time-limit", "1000", "--spp", "3"}));
+  expect_exit(most, 0);
+  EXPECT_THAT(most.err, HasSubstr("3 samples a pixel in 2 passes"));
+  expect_exit(run_shoal(folder, join(options, {"-o", folder / "asked.exr", "--spp", std::to_string(samples)})), 0);
+  expect_exit(run_shoal(folder, {"diff", folder / "limited.exr", folder / "asked.exr"}), 0);
+}
+
 TEST(RenderScene, LayersAreWrittenIntoThePictureAndCompared) {
   const TemporaryFolder folder;
   make_terrain(folder);

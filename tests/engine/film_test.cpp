@@ -27,7 +27,7 @@ TEST(Film, GivesTheSameBitsForEveryOrderOfAdding) {
   for (const Vec3& s : samples) forwards.add(0, s, true);
   std::reverse(samples.begin(), samples.end());
   for (const Vec3& s : samples) backwards.add(0, s, true);
-  EXPECT_EQ(forwards.resolve(2000), backwards.resolve(2000));
+  EXPECT_EQ(forwards.resolve(), backwards.resolve());
 }
 
 TEST(Film, KeepsATinyPixelBesideAHugeOneAndSmallTermsBesideLargeOnes) {
@@ -35,16 +35,15 @@ TEST(Film, KeepsATinyPixelBesideAHugeOneAndSmallTermsBesideLargeOnes) {
   film.add(0, Vec3(1e-10f), false);
   film.add(1, Vec3(1e10f), false);
   for (int i = 0; i < 1000000; ++i) film.add(1, Vec3(1e-3f), false);
-  const std::vector<float> rgba = film.resolve(1);
-  EXPECT_EQ(rgba[0], 1e-10f);
-  EXPECT_EQ(rgba[4], static_cast<float>(1e10 + 1e6 * static_cast<double>(1e-3f)));
+  EXPECT_EQ(static_cast<float>(film.sum(0, 0).to_double()), 1e-10f);
+  EXPECT_EQ(film.sum(1, 0).to_double(), 1e10 + 1e6 * static_cast<double>(1e-3f));
 }
 
 TEST(Film, SaysWhenARadianceIsClamped) {
   Film film(1, 1);
   EXPECT_TRUE(film.add(0, Vec3(1), true));
   EXPECT_FALSE(film.add(0, Vec3(1e30f, 0, 0), true));
-  EXPECT_EQ(film.resolve(2)[0], (Film::kMaxRadiance + 1) / 2);
+  EXPECT_EQ(film.resolve()[0], (Film::kMaxRadiance + 1) / 2);
 }
 
 TEST(Film, GivesTheMeanOfWhatAPixelHasSoFar) {
@@ -56,7 +55,7 @@ TEST(Film, GivesTheMeanOfWhatAPixelHasSoFar) {
   film.add(1, Vec3(2, 2, 0), false);
   EXPECT_EQ(film.mean(1, rgb), 2u);
   EXPECT_EQ((std::vector<float>(rgb, rgb + 3)), (std::vector<float>{1.5f, 2, 1.5f}));
-  const std::vector<float> rgba = film.resolve(2);
+  const std::vector<float> rgba = film.resolve();
   EXPECT_EQ((std::vector<float>(rgba.begin() + 4, rgba.end())), (std::vector<float>{1.5f, 2, 1.5f, 0.5f}));
   EXPECT_EQ(film.mean(0, rgb), 0u);
 }
@@ -70,7 +69,7 @@ TEST(Film, LosesNothingWhenThreadsShareAPixel) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  const std::vector<float> rgba = film.resolve(40000);
+  const std::vector<float> rgba = film.resolve();
   EXPECT_EQ(rgba, (std::vector<float>{0.1f, 1, 2, 0.5f}));
 }
 

@@ -84,7 +84,7 @@ TEST_F(PreviewTest, ACompleteFilmIsShownAsTheFinishedPicture) {
   whole.show_when_due(samples.count());
   ASSERT_TRUE(whole.first());
   EXPECT_EQ(whole.first()->pixel_share, 1.0);
-  const std::vector<float> rgba = film.resolve(2);
+  const std::vector<float> rgba = film.resolve();
   for (uint32_t i = 0; i < kWidth * kHeight; i += 97) {
     EXPECT_EQ(shown(i % kWidth, i / kWidth), encoded({rgba[i * 4], rgba[i * 4 + 1], rgba[i * 4 + 2]})) << i;
   }

@@ -23,6 +23,17 @@ TEST(SampleOrder, VisitsEverySampleOfEveryPixelOnce) {
   }
 }
 
+TEST(SampleOrder, ASpanHasTheSamplesOfTheWholeThatItNames) {
+  for (const uint32_t levels : {0u, 2u, SampleOrder::kAllLevels}) {
+    const SampleOrder part(150, 70, SampleSpan{2, 5}, 1, levels), whole(150, 70, 3, 1, levels);
+    ASSERT_EQ(part.count(), whole.count());
+    for (uint64_t index = 0; index < part.count(); ++index) {
+      const PixelSample a = part.at(index), b = whole.at(index);
+      ASSERT_TRUE(a.x == b.x && a.y == b.y && a.sample == b.sample + 2) << index;
+    }
+  }
+}
+
 TEST(SampleOrder, CoarseFirstVisitsEverySampleOfEveryPixelOnce) {
   for (const auto& [width, height, samples] : {std::array{70u, 50u, 3u}, {1u, 1u, 5u}, {129u, 97u, 1u}, {3001u, 1u, 2u},
                                                {1u, 2500u, 2u}, {257u, 131u, 2u}, {1023u, 2u, 4u}}) {

@@ -1,0 +1,61 @@
+// Which samples a render takes between one barrier and the next, and how long the rest will take. A render without a
+// limit is one pass of all its samples. With a time limit every pixel gets one sample, then passes grow until they near
+// the limit, and shrink towards it: a pass is ended whole, so that every pixel has the same samples and the picture is
+// that of so many samples asked for.
+//
+// How a pass is chosen: what a sample a pixel took in the last pass tells how many fit into the time that is left.
+//   at most 3 times the samples there are: barriers cost little, few samples are told of by few
+//   at most 3/4 of those that fit, if that is more than one: the last pass was not exactly like the next
+//   none when not one fits, or less than 1 % of what is there: nobody would see it
+// So a render ends within 1 % of its time or one sample a pixel before the limit, if a pass takes as long as foretold.
+// Called by engine/render. Plain values: the time is passed in. One thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "engine/sample_order.h"
+
+namespace shoal {
+
+class PassPlan {
+ public:
+  /// `limit_seconds`: 0: none.
+  PassPlan(uint32_t most_samples, double limit_seconds) : most_(most_samples), limit_(limit_seconds) {}
+
+  /// What every pixel gets next, so many seconds after the render began, when the pass before has ended. An empty span:
+  /// nothing, the render is over.
+  SampleSpan next(double seconds);
+
+  uint32_t done() const { return span_.end; }
+  uint32_t passes_count() const { return passes_count_; }
+
+ private:
+  uint32_t fitting(double seconds_left) const;
+
+  uint32_t most_;
+  double limit_;
+  SampleSpan span_;
+  uint32_t passes_count_ = 0;
+  double began_ = 0;           ///< the pass, in seconds
+  double sample_seconds_ = 0;  ///< that a sample a pixel took in the last pass
+};
+
+/// When a render will be over. Seconds since it began; samples of all pixels together.
+struct Forecast {
+  uint64_t samples_total = 0;  ///< as far as one can tell
+  double limit_seconds = 0;    ///< 0: none
+  // What the speed is counted from: the pass before, and with it what passes cost besides.
+  uint64_t samples_from = 0;
+  double seconds_from = 0;
+  uint64_t samples_mark = 0;
+  double seconds_mark = 0;
+
+  /// A pass begins.
+  void mark(uint64_t samples_done, double seconds);
+  std::optional<double> seconds_left(uint64_t samples_done, double seconds) const;
+  /// From 0 to 1.
+  double fraction(uint64_t samples_done, double seconds) const;
+};
+
+}  // namespace shoal
