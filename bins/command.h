@@ -15,6 +15,7 @@ using Command = std::function<int()>;
 void declare_build(CLI::App& app, Console& console, Command& command);
 void declare_render(CLI::App& app, Console& console, Command& command);
 void declare_compare(CLI::App& app, Console& console, Command& command);
+void declare_accuracy(CLI::App& app, Console& console, Command& command);
 void declare_info(CLI::App& app, Console& console, Command& command);
 void declare_verify(CLI::App& app, Console& console, Command& command);
 void declare_diff(CLI::App& app, Console& console, Command& command);

@@ -103,7 +103,7 @@ int run_compare(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   std::vector<Order> orders;
   for (const std::string& name : arguments.orders) orders.push_back(parse_order(name).value());
-  auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1, console);
+  auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1 ? 1 : 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   const auto compared = render_orders(arguments, prepared.value(), console);
   if (!compared.ok()) return console.error(compared.error());

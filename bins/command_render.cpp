@@ -78,7 +78,7 @@ int run_render(const Arguments& arguments, Console& console) {
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
   asked.execution.time_limit_seconds = arguments.time_limit;
   if (arguments.has_time_limit && asked.samples->count() == 0) asked.picture.samples = kMostSamples;
-  auto prepared = prepare_render(asked, {arguments.render.execution.order}, false, console);
+  auto prepared = prepare_render(asked, {arguments.render.execution.order}, 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
   RenderHooks hooks = console_hooks(console);

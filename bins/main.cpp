@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
   shoal::declare_build(app, console, command);
   shoal::declare_render(app, console, command);
   shoal::declare_compare(app, console, command);
+  shoal::declare_accuracy(app, console, command);
   shoal::declare_info(app, console, command);
   shoal::declare_verify(app, console, command);
   shoal::declare_diff(app, console, command);

@@ -26,8 +26,6 @@ std::atomic<bool> g_stop{false};  ///< the only global: a signal handler can rea
 
 void on_signal(int) { g_stop.store(true, std::memory_order_relaxed); }
 
-bool is_shoal_file(const std::string& path) { return path.ends_with(".shoal"); }
-
 std::filesystem::path default_cache_folder() {
   if (const char* folder = std::getenv("XDG_CACHE_HOME"); folder != nullptr && *folder == '/') {
     return std::filesystem::path(folder) / "shoal";
@@ -37,8 +35,9 @@ std::filesystem::path default_cache_folder() {
 }
 
 /// The .shoal of a glTF: built into the cache folder unless it is there already.
-Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOptions options, Console& console) {
+Result<std::string> find_or_build(const RenderArguments& arguments, PreparedRender& prepared, Console& console) {
   FileSystem& fs = posix_file_system();
+  SceneBuildOptions options = prepared.build;
   SHOAL_ASSIGN_OR_RETURN(const uint64_t key, build_cache_key(fs, arguments.scene, options));
   const std::filesystem::path folder =
       arguments.cache_folder.empty() ? default_cache_folder() : std::filesystem::path(arguments.cache_folder);
@@ -55,6 +54,7 @@ Result<std::string> find_or_build(const RenderArguments& arguments, SceneBuildOp
   console.end_progress();
   if (!report.ok()) return std::move(report).error();
   for (const std::string& warning : report.value().warnings) console.warning(warning);
+  prepared.build_seconds = report.value().seconds;
   return path;
 }
 
@@ -78,15 +78,15 @@ Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& c
   return {};
 }
 
-/// Refuses a cap that cannot work before tables are read. Each order must fit, beside a picture that is kept.
-Status fit_cap(const PageFile& file, const std::vector<Order>& orders, bool picture_kept, PreparedRender& prepared) {
+/// Refuses a cap that cannot work before tables are read. Each order must fit, beside pictures that are kept.
+Status fit_cap(const PageFile& file, const std::vector<Order>& orders, uint32_t pictures_kept, PreparedRender& prepared) {
   const uint64_t picture_bytes = uint64_t{prepared.picture.width} * prepared.picture.height * 4 * sizeof(float);
   MemoryPlan plan;
   for (const Order order : orders) {
     ExecutionOptions execution = prepared.execution;
     execution.order = order;
     SHOAL_ASSIGN_OR_RETURN(plan, plan_before_tables(posix_file_system(), file, prepared.picture, execution,
-                                                    picture_kept ? picture_bytes : 0));
+                                                    pictures_kept * picture_bytes));
   }
   prepared.execution.process_bytes = plan.process_bytes;
   return {};
@@ -114,6 +114,8 @@ Result<uint64_t> size_or_zero(const std::string& text) {
 }
 
 }  // namespace
+
+bool is_shoal_file(const std::string& path) { return path.ends_with(".shoal"); }
 
 Result<uint64_t> parse_size(const std::string& text) {
   double value = 0;
@@ -294,7 +296,7 @@ void RenderArguments::declare(CLI::App& app) {
 }
 
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
-                                      bool picture_kept, Console& console) {
+                                      uint32_t pictures_kept, Console& console) {
   PreparedRender prepared;
   prepared.picture = arguments.picture;
   prepared.execution = arguments.execution;
@@ -305,7 +307,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   if (!arguments.variant.empty() && is_shoal_file(arguments.scene)) {
     return Error{ErrorCode::kUsage, "--variant is of a .gltf or .glb: a .shoal holds the variant that it was built with"};
   }
-  SceneBuildOptions build;
+  SceneBuildOptions& build = prepared.build;
   build.variant = arguments.variant;
   build.threads = arguments.execution.threads;
   build.scratch_folder = arguments.scratch_folder;
@@ -314,13 +316,14 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   if (!arguments.treelet_size.empty()) {
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
   }
+  if (arguments.adjust_build) arguments.adjust_build(build);
   std::string path = arguments.scene;
   if (!is_shoal_file(path)) {
-    SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, build, console));
+    SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, prepared, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
   SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
-  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, picture_kept, prepared));
+  SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, pictures_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
   if (is_shoal_file(arguments.scene)) SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {

@@ -51,6 +51,7 @@ struct RenderArguments {
   bool buffered_reads = false, allow_stale = false;
   uint32_t more_levels = 32;
   CLI::Option* samples = nullptr;  ///< --spp
+  std::function<void(SceneBuildOptions&)> adjust_build;  ///< may be empty; of the options that a glTF is built with
 
   void declare(CLI::App& app);
 };
@@ -60,11 +61,15 @@ struct PreparedRender {
   Scene scene;
   PictureOptions picture;
   ExecutionOptions execution;
+  SceneBuildOptions build;              ///< what a glTF was built with, now or before
+  std::optional<double> build_seconds;  ///< where it was built now
 };
 /// Builds first where needed (into the cache folder, keyed by content), opens, parses sizes and environment. The cap must
-/// fit every one of `orders`, beside a picture of the same size where `picture_kept`.
+/// fit every one of `orders`, beside `pictures_kept` pictures of the same size.
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
-                                      bool picture_kept, Console& console);
+                                      uint32_t pictures_kept, Console& console);
+/// Whether a path names a built scene.
+bool is_shoal_file(const std::string& path);
 
 /// Becomes true at SIGINT or SIGTERM, from this call on.
 const std::atomic<bool>* stop_on_signals();

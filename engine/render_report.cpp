@@ -174,6 +174,8 @@ std::string format_bytes(uint64_t bytes) {
   return fmt::format("{:.{}f} {}", value, value < 10 ? 2 : value < 100 ? 1 : 0, kUnits[unit]);
 }
 
+std::string machine_description() { return machine_json().dump(); }
+
 EffectAskers effect_askers(const PictureOptions& picture) {
   EffectAskers askers;
   const EnvironmentOptions& sky = picture.shading.environment;

@@ -22,6 +22,9 @@ EffectAskers effect_askers(const PictureOptions& picture);
 std::string stats_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
                        const ExecutionOptions& execution);
 
+/// Processor, memory and system as that document has them, JSON text.
+std::string machine_description();
+
 /// One column of the traffic table.
 struct TrafficColumn {
   std::string title;

@@ -30,6 +30,8 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
                   "--projection", "perspective, orthographic, equirectangular, fisheye", "--fov", "--ortho-height",
                   "--aperture", "--focus", "--distortion", "--time", "--animation"}},
       {"compare", {"--orders", "--out", "--runs", "--width", "--spp", "--max-memory"}},
+      {"accuracy", {"--out", "--budget", "--seeds", "--knobs", "--reference", "--reference-spp", "--width", "--max-memory",
+                    "--camera", "--environment", "--exposure", "--order"}},
       {"info", {"--json"}},
       {"verify", {"file"}},
       {"diff", {"--json", "--cost-maps"}},
@@ -68,6 +70,7 @@ TEST(Usage, UnknownAndMissingOptionsExitTwoAndAreNamed) {
   expect_usage(run_shoal(folder, {"render", "x.gltf", "-o", "y.exr", "--shiny"}), {"--shiny"});
   expect_usage(run_shoal(folder, {"build", "x.gltf"}), {"--output"});
   expect_usage(run_shoal(folder, {"compare", "x.gltf"}), {"--out"});
+  expect_usage(run_shoal(folder, {"accuracy", "x.gltf"}), {"--out"});
   expect_usage(run_shoal(folder, {"generate", "terrain"}), {"--out"});
   expect_usage(run_shoal(folder, {"diff", "x.exr"}), {"b is required"});
   expect_usage(run_shoal(folder, {"info"}), {"file"});
