@@ -84,7 +84,8 @@ RgbPicture join_channels(const ExrImage& image, const std::string& prefix) {
 /// --reference into the job: R, G, B, and where the layers `variance` and `samples` are there its noise.
 Status read_reference(const std::string& path, AccuracyJob& job) {
   const uint64_t pixels = uint64_t{job.sizes.width} * job.sizes.height;
-  SHOAL_ASSIGN_OR_RETURN(const ExrImage image, read_exr(posix_file_system(), path, pixels));
+  constexpr uint64_t kMaxChannels = 64;
+  SHOAL_ASSIGN_OR_RETURN(const ExrImage image, read_exr(posix_file_system(), path, pixels * kMaxChannels / 4));
   job.reference = join_channels(image, "");
   if (image.width != job.sizes.width || image.height != job.sizes.height || job.reference.empty()) {
     return Error{ErrorCode::kInput, fmt::format("{}: expected R, G and B of {} x {} pixels (--width, --height), found {} x {}",

@@ -16,7 +16,7 @@ constexpr uint64_t kMaxPixels = 1ull << 28;
 
 struct InspectArguments {
   std::string file, other, json;
-  bool as_json = false, cost_maps = false;
+  bool as_json = false, cost_maps = false, flip = false;
 };
 
 int run_info(const InspectArguments& arguments, Console& console) {
@@ -42,7 +42,7 @@ int run_diff(const InspectArguments& arguments, Console& console) {
   if (!a.ok()) return console.error(a.error());
   const auto b = read_exr(posix_file_system(), arguments.other, kMaxPixels);
   if (!b.ok()) return console.error(b.error());
-  const ImageDiff diff = diff_images(a.value(), b.value(), {arguments.cost_maps});
+  const ImageDiff diff = diff_images(a.value(), b.value(), {arguments.cost_maps, arguments.flip});
   fmt::print("{}\n", arguments.as_json ? diff_json(diff) : diff_text(diff));
   return diff.identical ? 0 : kExitPicturesDiffer;
 }
@@ -75,6 +75,7 @@ void declare_diff(CLI::App& app, Console& console, Command& command) {
   sub->add_option("b", arguments->other, "the reference, an .exr")->required();
   sub->add_flag("--json", arguments->as_json, "as JSON");
   sub->add_flag("--cost-maps", arguments->cost_maps, "compare heat maps of cost too");
+  sub->add_flag("--flip", arguments->flip, "mean HDR-FLIP too: how different they look, 0 to 1 (docs/accuracy.md)");
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_diff(*arguments, console); };
   });

@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "engine/flip.h"
 #include "io/gltf_json.h"
 
 namespace shoal {
@@ -135,6 +136,19 @@ void compare_channels(const ChannelMap& a, const ChannelMap& b, ImageDiff& diff)
   color_sums.finish(diff.color);
 }
 
+/// R, G and B as one picture; nothing where one is missing.
+std::optional<std::vector<float>> rgb_of(const ChannelMap& channels) {
+  std::vector<float> rgb;
+  for (size_t c = 0; c < 3; ++c) {
+    const auto at = channels.find(std::string(1, "RGB"[c]));
+    if (at == channels.end()) return std::nullopt;
+    const std::vector<float>& values = at->second->values;
+    rgb.resize(values.size() * 3);
+    for (size_t i = 0; i < values.size(); ++i) rgb[i * 3 + c] = values[i];
+  }
+  return rgb;
+}
+
 nlohmann::ordered_json channel_json(const ChannelDiff& channel) {
   return {{"name", channel.name},
           {"differing_count", channel.differing_count},
@@ -172,13 +186,17 @@ ImageDiff diff_images(const ExrImage& a, const ExrImage& b, const ImageDiffOptio
   compare_channels(channels_a, channels_b, diff);
   count_pixels(channels_a, channels_b, a.width, diff);
   diff.identical = same_channels && diff.differing_pixels_count == 0;
+  if (!options.flip || diff.pixels_count == 0) return diff;
+  const auto test = rgb_of(channels_a), reference = rgb_of(channels_b);
+  if (test && reference) diff.mean_flip = mean_value(hdr_flip(a.width, a.height, *reference, *test));
   return diff;
 }
 
 std::string diff_text(const ImageDiff& diff) {
+  const std::string flip = diff.mean_flip ? fmt::format("\n  HDR-FLIP, mean: {:.5f}", *diff.mean_flip) : "";
   if (diff.identical) {
-    return fmt::format("identical: {} pixels, {} channels, every bit equal", diff.pixels_count,
-                       diff.channels.size());
+    return fmt::format("identical: {} pixels, {} channels, every bit equal{}", diff.pixels_count, diff.channels.size(),
+                       flip);
   }
   std::string text = "different";
   for (const std::string& note : diff.notes) text += "\n  " + note;
@@ -192,7 +210,7 @@ std::string diff_text(const ImageDiff& diff) {
     text += "\n  " + channel_text(diff.color);
   }
   for (const ChannelDiff& channel : diff.channels) text += "\n  " + channel_text(channel);
-  return text;
+  return text + flip;
 }
 
 std::string diff_json(const ImageDiff& diff) {
@@ -210,6 +228,7 @@ std::string diff_json(const ImageDiff& diff) {
                      {"a", diff.first.a},
                      {"b", diff.first.b}};
   }
+  if (diff.mean_flip) json["mean_hdr_flip"] = *diff.mean_flip;
   json["color"] = channel_json(diff.color);
   json["channels"] = nlohmann::ordered_json::array();
   for (const ChannelDiff& channel : diff.channels) json["channels"].push_back(channel_json(channel));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ struct ImageDiffOptions {
   /// Cost maps (kCostChannelPrefixes) depend on the order of traversal by design; they are left out unless asked
   /// for.
   bool cost_maps = false;
+  bool flip = false;  ///< HDR-FLIP of R, G and B as well (engine/flip); takes seconds a megapixel
 };
 
 inline constexpr const char* kCostChannelPrefixes[] = {"treelets.", "bytes.", "time."};
@@ -38,6 +40,7 @@ struct ImageDiff {
   uint64_t differing_pixels_count = 0;
   std::vector<ChannelDiff> channels;  ///< of both, by name
   ChannelDiff color;                  ///< R, G and B together
+  std::optional<double> mean_flip;    ///< where it was asked for and both have R, G and B
 
   struct First {
     bool found = false;

@@ -34,7 +34,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
                     "--camera", "--environment", "--exposure", "--order"}},
       {"info", {"--json"}},
       {"verify", {"file"}},
-      {"diff", {"--json", "--cost-maps"}},
+      {"diff", {"--json", "--cost-maps", "--flip"}},
       {"generate", {"--triangles", "--out", "--source", "--seed"}},
   };
   const ProgramRun whole = run_shoal(folder, {"--help"});

@@ -146,5 +146,19 @@ TEST(ImageDiff, JsonHoldsWhatWasFound) {
   EXPECT_EQ(json["channels"][0]["name"], "R");
 }
 
+TEST(ImageDiff, FlipIsThereOnlyWhenAskedForAndWithAllThreeColours) {
+  const ExrImage a = picture(4, 4, {"R", "G", "B"});
+  ExrImage b = a;
+  EXPECT_FALSE(diff_images(a, b).mean_flip.has_value());
+  EXPECT_EQ(diff_images(a, b, {.flip = true}).mean_flip, 0);
+  for (float& value : b.channels[0].values) value *= 3;
+  const ImageDiff diff = diff_images(a, b, {.flip = true});
+  ASSERT_TRUE(diff.mean_flip.has_value());
+  EXPECT_GT(*diff.mean_flip, 0.1);
+  EXPECT_NE(diff_text(diff).find("HDR-FLIP, mean: 0."), std::string::npos) << diff_text(diff);
+  EXPECT_GT(nlohmann::json::parse(diff_json(diff))["mean_hdr_flip"], 0.1);
+  EXPECT_FALSE(diff_images(picture(2, 2, {"R"}), picture(2, 2, {"R"}), {.flip = true}).mean_flip.has_value());
+}
+
 }  // namespace
 }  // namespace shoal
