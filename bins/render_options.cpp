@@ -245,6 +245,13 @@ void RenderArguments::declare(CLI::App& app) {
   add_choice(app, "--texture-filter", picture.shading.texture_filter, kFilters,
              ": textures by the width of the ray (default), or always at their finest")
       ->type_name("WAY");
+  static const std::map<std::string, TriangleTest> kTriangleTests{{"fast", TriangleTest::kFast},
+                                                                  {"watertight", TriangleTest::kWatertight},
+                                                                  {"double", TriangleTest::kDouble}};
+  add_choice(app, "--triangle-test", picture.shading.triangle_test, kTriangleTests,
+             ": all in float, which may let light through where triangles meet; with exact signs (default); sheared in "
+             "double as well")
+      ->type_name("WAY");
   app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   app.add_option("--max-memory", max_memory, kMaxMemoryHelp);
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")

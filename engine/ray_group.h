@@ -57,10 +57,11 @@ class RayGroup {
 
   /// Every ray goes on by one treelet: address, send, trace. Returns the number of rays traced.
   template <class Decide>
-  uint32_t step(const TopTree& tree, TraceCounters& counters, const Decide& decide) {
+  uint32_t step(const TopTree& tree, TraceCounters& counters, const Decide& decide,
+                TriangleTest test = TriangleTest::kWatertight) {
     address(tree);
     send(tree, decide);
-    return trace(tree, counters);
+    return trace(tree, counters, test);
   }
 
   /// Finds the next entry of every ray that stands on none.
@@ -83,7 +84,7 @@ class RayGroup {
     size_ = kept;
   }
   /// Traces every ray through the treelet that it stands on. Returns their number.
-  uint32_t trace(const TopTree& tree, TraceCounters& counters);
+  uint32_t trace(const TopTree& tree, TraceCounters& counters, TriangleTest test);
 
  private:
   uint32_t size_;

@@ -22,7 +22,8 @@ class HybridWorker final : public RayStream {
       : context_(context),
         worker_(context, thread),
         paths_(context.scene.treelets.size()),
-        tracer_(context.scene.top_tree, paths_.pages.data()) {}
+        tracer_(context.scene.top_tree, paths_.pages.data(), RayGrouping::kAuto,
+                context.picture.shading.triangle_test) {}
 
   void run() {
     worker_.enter(Phase::kTraversal);

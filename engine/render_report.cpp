@@ -146,6 +146,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"light_choice", picture.shading.light_choice == LightChoice::kTree ? "tree" : "power"},
           {"effects", effects_text(picture.shading.effects)},
           {"texture_filter", picture.shading.texture_filter == TextureFilter::kMip ? "mip" : "bilinear"},
+          {"triangle_test", triangle_test_name(picture.shading.triangle_test)},
           {"aovs", aov_names(picture.aovs)},
           {"order", order_name(result.order.order)},
           {"order_asked", order_name(execution.order)},

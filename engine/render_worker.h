@@ -101,7 +101,8 @@ class RenderWorker {
     if (visits_aovs_ != nullptr) {
       group.each([&](const Ray& ray) { count_treelets(pixel_of(ray), 1); });
     }
-    counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_);
+    counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_,
+                                                         context_.picture.shading.triangle_test);
   }
   /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
   void count_leaving(const GroupRay& member, TreeletId next);

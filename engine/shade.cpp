@@ -80,7 +80,8 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   result = {};
   path.shadow_radiance = Vec3(0);
   ++counters.vertices_shaded_count;
-  const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes);
+  const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes,
+                                       options_->triangle_test);
   const Material& material = materials_[surface.attributes.material];
   const uint32_t effects = kOnlyLambert ? 0 : options_->effects.of(material.effects);
   if (!kOnlyLambert && ((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {

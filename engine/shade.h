@@ -47,6 +47,7 @@ struct ShadingOptions {
   LightChoice light_choice = LightChoice::kTree;
   EffectChoice effects;
   TextureFilter texture_filter = TextureFilter::kMip;
+  TriangleTest triangle_test = TriangleTest::kWatertight;  ///< what traversal and shading find triangles by
 };
 
 /// Tables shared by all threads: light sampling distributions or a tree over the lights (made by `threads`), environment

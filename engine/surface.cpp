@@ -78,13 +78,13 @@ Vec4 Surface::color() const {
 }
 
 Surface find_surface(const PathState& path, const Instance& instance, std::span<const std::byte> geometry,
-                     std::span<const std::byte> attributes) {
+                     std::span<const std::byte> attributes, TriangleTest test) {
   Surface s;
   const TreeletTriangle triangle = find_triangle(geometry, path.hit.slot);
   Ray ray;
   ray.origin = path.origin, ray.direction = path.direction, ray.t = path.t;
   ray.hit = path.hit;
-  const TrianglePoint at = intersect_known(ray, instance, triangle);
+  const TrianglePoint at = intersect_known(ray, instance, triangle, test);
   s.b1 = at.b1, s.b2 = at.b2;
   if (!attributes.empty()) s.attributes = find_attributes(attributes, triangle.ordinal);
   if (triangle.material != kNoIndex) s.attributes.material = triangle.material;

@@ -35,7 +35,7 @@ struct Surface {
 
 /// `geometry` and `attributes` as for Shader::shade_hit. Requires: path.hit.valid().
 Surface find_surface(const PathState& path, const Instance& instance, std::span<const std::byte> geometry,
-                     std::span<const std::byte> attributes);
+                     std::span<const std::byte> attributes, TriangleTest test = TriangleTest::kWatertight);
 
 /// The front normal bent by a tangent-space normal (glTF: x along the tangent, y along the bitangent, z out).
 /// Tangents come from the corners or, where those are zero, from the derivatives of uv set `uv_set` over the

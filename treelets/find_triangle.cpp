@@ -19,11 +19,12 @@ TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot) {
   return triangle;
 }
 
-TrianglePoint intersect_known(const Ray& ray, const Instance& instance, const TreeletTriangle& triangle) {
+TrianglePoint intersect_known(const Ray& ray, const Instance& instance, const TreeletTriangle& triangle,
+                              TriangleTest test) {
   const RaySpace space = to_object_space(ray, instance);
   TriangleHit hit{0, 0, 0};
   // A ray that misses after all (not the one that hit) still gets a point of the triangle.
-  intersect_triangle(space, triangle.p0, triangle.p1, triangle.p2, kRayInfinity, hit);
+  intersect_triangle(test, space, triangle.p0, triangle.p1, triangle.p2, kRayInfinity, hit);
   return {hit.t, hit.b1, hit.b2};
 }
 

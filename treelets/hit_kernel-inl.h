@@ -95,6 +95,14 @@ HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint
 
 #endif
 
+/// The same for any kind of test; only the default has a form in lanes.
+template <TriangleTest kTest>
+HWY_INLINE bool intersect_stored_by(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max,
+                                    TriangleHit& hit) {
+  if constexpr (kTest == TriangleTest::kWatertight) return intersect_stored(ray, leaf, i, t_max, hit);
+  return intersect_triangle<kTest>(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), t_max, hit);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
 HWY_AFTER_NAMESPACE();

@@ -120,6 +120,48 @@ HWY_INLINE hn::Mask<F16> edges_differ(const ShearedLanes corner[3]) {
   return hn::And(positive, negative);
 }
 
+/// Lanes whose edge functions by TriangleTest::kFast have different signs: never fused, so the bits of triangle_test.h.
+HWY_INLINE hn::Mask<F16> float_edges_differ(const ShearedLanes corner[3]) {
+  const F16 f;
+  const auto none = hn::Zero(f);
+  auto positive = hn::Lt(none, none), negative = positive;
+  const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
+  for (int e = 0; e < 3; ++e) {
+    const auto value = hn::Sub(hn::Mul(corner[from[e]].x, corner[to[e]].y), hn::Mul(corner[from[e]].y, corner[to[e]].x));
+    positive = hn::Or(positive, hn::Gt(value, none));
+    negative = hn::Or(negative, hn::Lt(value, none));
+  }
+  return hn::And(positive, negative);
+}
+
+/// Lanes whose edge functions by TriangleTest::kDouble have certainly different signs. Sheared corners in float err by
+/// half of `pad` (RaySpace::pad) and little more an axis, so an edge function errs by (|ax| + |ay| + |bx| + |by| + pad)
+/// pad / 2 beside what edges_differ() allows for.
+HWY_INLINE hn::Mask<F16> double_edges_differ(const ShearedLanes corner[3], V16 pad) {
+  const F16 f;
+  auto positive = hn::Lt(hn::Zero(f), hn::Zero(f)), negative = positive;
+  const int from[3] = {2, 0, 1}, to[3] = {1, 2, 0};
+  for (int e = 0; e < 3; ++e) {
+    const ShearedLanes &a = corner[from[e]], &b = corner[to[e]];
+    const auto product = hn::Mul(a.y, b.x);
+    const auto value = hn::MulSub(a.x, b.y, product);
+    const auto size = hn::Add(hn::Add(hn::Add(hn::Abs(a.x), hn::Abs(a.y)), hn::Add(hn::Abs(b.x), hn::Abs(b.y))), pad);
+    const auto rounding = hn::MulAdd(hn::Set(f, kEdgeError), hn::Abs(product), hn::Set(f, kEdgeUnderflow));
+    const auto bound = hn::MulAdd(size, pad, rounding);
+    positive = hn::Or(positive, hn::Gt(value, bound));
+    negative = hn::Or(negative, hn::Lt(value, hn::Neg(bound)));
+  }
+  return hn::And(positive, negative);
+}
+
+/// Lanes that a test of this kind certainly rejects for its edges.
+template <TriangleTest kTest>
+HWY_INLINE hn::Mask<F16> edges_reject(const RaySpace& ray, const ShearedLanes corner[3]) {
+  if constexpr (kTest == TriangleTest::kFast) return float_edges_differ(corner);
+  if constexpr (kTest == TriangleTest::kDouble) return double_edges_differ(corner, hn::Set(F16(), ray.pad));
+  return edges_differ(corner);
+}
+
 /// Lanes whose triangle the exact test leaves out for where it begins and ends along RaySpace::kz: its own box
 /// (triangle_test.h) is entered behind `t` or left before the ray begins. `inverse`: RaySpace::inverse along kz; `pads`:
 /// two of RaySpace::pad, as t. The box has one pad, and roundings of about u R (ray_space.h), which are less than
@@ -130,7 +172,8 @@ HWY_INLINE hn::Mask<F16> out_of_reach(const ShearedLanes corner[3], V16 inverse,
   return hn::Or(hn::Gt(hn::Min(hn::Min(a, b), c), last), hn::Lt(hn::Max(hn::Max(a, b), c), hn::Neg(pads)));
 }
 
-/// The triangles of a leaf that the exact test may accept at or before `t`.
+/// The triangles of a leaf that the test of this kind may accept at or before `t`.
+template <TriangleTest kTest = TriangleTest::kWatertight>
 HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf, float t) {
   const F16 f;
   const LeafCorners corners(ray, leaf);
@@ -140,8 +183,8 @@ HWY_INLINE uint32_t find_candidates(const RaySpace& ray, const LeafView& leaf, f
   for (size_t first = 0; first < leaf.triangle_count; first += kLeafLanes) {
     const ShearedLanes corner[3] = {corners.at(0, first), corners.at(1, first), corners.at(2, first)};
     uint8_t bits[8] = {};
-    hn::StoreMaskBits(f, hn::Or(edges_differ(corner), out_of_reach(corner, hn::Set(f, inverse), pads, hn::Set(f, t))),
-                      bits);
+    const auto behind = out_of_reach(corner, hn::Set(f, inverse), pads, hn::Set(f, t));
+    hn::StoreMaskBits(f, hn::Or(edges_reject<kTest>(ray, corner), behind), bits);
     rejected |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << first;
   }
   return ~rejected & ((1u << leaf.triangle_count) - 1);

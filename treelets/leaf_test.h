@@ -46,10 +46,12 @@ inline bool take_hit(const TreeletView& treelet, const LeafView& leaf, uint32_t 
 }
 
 /// Tests triangle `i` of the leaf at `offset`. Returns true when an any-hit ray is done.
+template <TriangleTest kTest>
 inline bool test_triangle(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t i,
                           const RaySpace& space, const TraceJob& job, TraceCounters& counters) {
   TriangleHit hit;
-  return intersect_triangle(space, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), job.ray->t, hit) &&
+  return intersect_triangle<kTest>(space, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), job.ray->t,
+                                   hit) &&
          take_hit(treelet, leaf, offset, i, hit, *job.ray, job.entry.treelet, counters);
 }
 

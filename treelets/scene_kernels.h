@@ -14,6 +14,7 @@ struct SceneTables {
   const TreeletEntry* entries;
   const Instance* instances;
   PageTable pages;
+  TriangleTest test;
 };
 
 /// Levels of the top tree, instances and object together, that the stacks have room for.
@@ -63,7 +64,8 @@ struct PacketTracer {
   /// Whether this processor has a kernel for packets.
   static bool available();
   /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait
-  /// for the next call, or for next_waiting(). Requires: available(), and that the tree is of a single_identity().
+  /// for the next call, or for next_waiting(). Requires: available(), that the tree is of a single_identity(), and
+  /// TriangleTest::kWatertight.
   PacketUse trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
   /// Takes a ray back that waits for a packet; nullptr: none does.
   Ray* next_waiting();

@@ -44,7 +44,7 @@ RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, Tra
     const std::byte* page = page_of(tables, entry.treelet, stream);
     if (page == nullptr) continue;
     TraceJob job{page, &ray, &context, &tables.instances[ray.instance], entry};
-    trace_treelets({&job, 1}, tests);
+    trace_treelets({&job, 1}, tests, tables.test);
     ++work.treelets;
   }
   ray.cursor = kNoIndex, ray.instance = kNoIndex, ray.more = 0;
@@ -54,10 +54,11 @@ RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, Tra
   return work;
 }
 
-SceneTracer::SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping)
+SceneTracer::SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping, TriangleTest test)
     : tree_(tree),
       pages_(pages),
       grouping_(grouping),
+      test_(test),
       lanes_(std::make_unique<LaneTracer>()),
       packets_(std::make_unique<PacketTracer>()) {
   uint32_t deepest = 0;
@@ -70,9 +71,9 @@ SceneTracer::~SceneTracer() = default;
 
 uint64_t SceneTracer::bytes() { return sizeof(SceneTracer) + LaneTracer::bytes() + PacketTracer::bytes(); }
 
-/// Packets need all rays in one space.
+/// Packets need all rays in one space, and have the default's triangle test only.
 bool SceneTracer::use_packets() const {
-  return grouping_ != RayGrouping::kSingle && PacketTracer::available() && tree_.single_identity();
+  return test_ == TriangleTest::kWatertight && grouping_ != RayGrouping::kSingle && PacketTracer::available() && tree_.single_identity();
 }
 
 void SceneTracer::trace(RayStream& stream, TraceCounters& counters) {
@@ -80,7 +81,8 @@ void SceneTracer::trace(RayStream& stream, TraceCounters& counters) {
     while (Ray* ray = stream.next()) stream.done(*ray, {});
     return;
   }
-  const SceneTables tables{&tree_, tree_.nodes().data(), tree_.entries().data(), tree_.instances().data(), pages_};
+  const SceneTables tables{&tree_, tree_.nodes().data(), tree_.entries().data(), tree_.instances().data(), pages_,
+                           test_};
   if (slow_) {
     while (Ray* ray = stream.next()) stream.done(*ray, trace_slowly(tables, *ray, stream, counters));
     return;

@@ -46,13 +46,14 @@ class RayStream {
 using PageTable = const std::byte* const*;
 
 /// kPackets: where they can be. Not with instances (a packet needs one space), nor on processors without vectors of 256
-/// bits; there rays go single.
+/// bits, nor by another TriangleTest than the default; there rays go single.
 enum class RayGrouping { kAuto, kPackets, kSingle };
 
 class SceneTracer {
  public:
   /// Keeps a reference to the tree and the table.
-  SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping = RayGrouping::kAuto);
+  SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping = RayGrouping::kAuto,
+              TriangleTest test = TriangleTest::kWatertight);
   ~SceneTracer();
   /// Of a tracer.
   static uint64_t bytes();
@@ -65,6 +66,7 @@ class SceneTracer {
   const TopTree& tree_;
   PageTable pages_;
   RayGrouping grouping_;
+  TriangleTest test_;
   bool slow_;                ///< the top tree is too deep or too large for the kernels: every ray goes the slow way
   bool in_packets_ = true;   ///< what the last rays did better in
   std::unique_ptr<struct LaneTracer> lanes_;

@@ -107,6 +107,7 @@ HWY_INLINE uint32_t enter_top_children(const RaySpace& ray, const TopNode& node,
 }
 #endif
 
+template <TriangleTest kTest>
 class StreamTracer {
  public:
   StreamTracer(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
@@ -297,7 +298,7 @@ class StreamTracer {
       SceneLane& lane = lanes_[list[i]];
       const LeafView leaf = lane.leaf();
       lane.work.triangle_tests += leaf.triangle_count;
-      lane.candidates = find_candidates(*lane.space, leaf, lane.ray->t);
+      lane.candidates = find_candidates<kTest>(*lane.space, leaf, lane.ray->t);
     }
     for (uint32_t i = 0; i < list.size(); ++i) {
       SceneLane& lane = lanes_[list[i]];
@@ -316,7 +317,7 @@ class StreamTracer {
     for (uint32_t mask = lane.candidates; mask != 0; mask &= mask - 1) {
       const uint32_t i = static_cast<uint32_t>(std::countr_zero(mask));
       TriangleHit hit;
-      if (intersect_stored(*lane.space, leaf, i, lane.ray->t, hit) &&
+      if (intersect_stored_by<kTest>(*lane.space, leaf, i, lane.ray->t, hit) &&
           take_hit(treelet, leaf, leaf_offset(lane.ref), i, hit, *lane.ray, lane.entry.treelet, counters_)) {
         return true;
       }
@@ -337,7 +338,15 @@ class StreamTracer {
 
 uint64_t trace_lanes(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
                      TraceCounters& counters) {
-  return StreamTracer(tables, lanes, most, stream, counters).run();
+  return StreamTracer<TriangleTest::kWatertight>(tables, lanes, most, stream, counters).run();
+}
+uint64_t trace_lanes_fast(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
+                          TraceCounters& counters) {
+  return StreamTracer<TriangleTest::kFast>(tables, lanes, most, stream, counters).run();
+}
+uint64_t trace_lanes_double(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
+                            TraceCounters& counters) {
+  return StreamTracer<TriangleTest::kDouble>(tables, lanes, most, stream, counters).run();
 }
 
 }  // namespace HWY_NAMESPACE
@@ -348,12 +357,20 @@ HWY_AFTER_NAMESPACE();
 namespace shoal {
 
 HWY_EXPORT(trace_lanes);
+HWY_EXPORT(trace_lanes_fast);
+HWY_EXPORT(trace_lanes_double);
 
 LaneTracer::LaneTracer() : lanes(std::make_unique<SceneLanes>()) {}
 LaneTracer::~LaneTracer() = default;
 uint64_t LaneTracer::bytes() { return sizeof(LaneTracer) + sizeof(SceneLanes); }
 
 uint64_t LaneTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters) {
+  if (tables.test == TriangleTest::kFast) {
+    return HWY_DYNAMIC_DISPATCH(trace_lanes_fast)(tables, *lanes, most, stream, counters);
+  }
+  if (tables.test == TriangleTest::kDouble) {
+    return HWY_DYNAMIC_DISPATCH(trace_lanes_double)(tables, *lanes, most, stream, counters);
+  }
   return HWY_DYNAMIC_DISPATCH(trace_lanes)(tables, *lanes, most, stream, counters);
 }
 

@@ -10,9 +10,9 @@
 #include "io/result.h"
 #include "treelets/ray.h"
 #include "treelets/top_tree.h"
+#include "treelets/triangle_test_kind.h"
 
 namespace shoal {
-
 
 struct TraceCounters {
   uint64_t node_tests_count = 0;  ///< 8-wide nodes tested, in treelets and top tree
@@ -37,13 +37,13 @@ struct TraceJob {
 /// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
 /// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the
 /// page (as in PagePin::bytes). Adds the jobs' tests to `counters`.
-void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters);
+void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
 /// One ray. `instance` is the one that ray.instance names.
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
-                   TraceCounters& counters);
+                   TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
 /// The same for a worker that keeps `context` while it has this ray in hand (treelets/ray_space.h).
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
-                   RayContext& context, TraceCounters& counters);
+                   RayContext& context, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
 
 /// Checks every offset and count of a geometry page from a file, so that trace_treelet and find_triangle cannot
 /// read outside it or loop. Run once when a page is decoded. Fails with: kCorrupt.
@@ -63,11 +63,12 @@ struct TreeletTriangle {
 TreeletTriangle find_triangle(std::span<const std::byte> page, uint32_t slot);
 
 /// Where a ray meets a triangle that it is known to hit: barycentrics of p1 and p2 by the same arithmetic as
-/// traversal.
+/// traversal, if `test` is what traversal tests by.
 struct TrianglePoint {
   float t, b1, b2;
 };
-TrianglePoint intersect_known(const Ray& ray, const Instance& instance, const TreeletTriangle& triangle);
+TrianglePoint intersect_known(const Ray& ray, const Instance& instance, const TreeletTriangle& triangle,
+                              TriangleTest test = TriangleTest::kWatertight);
 
 /// Attributes of one triangle's corners from an attribute page. Missing ones have their defaults:
 /// normal and tangent zero, colour one, uv zero.

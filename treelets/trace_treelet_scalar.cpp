@@ -23,9 +23,8 @@ uint32_t cross_node(const RaySpace& space, const QuantizedNode& node, float t, u
   return mask;
 }
 
-}  // namespace
-
-void trace_treelet_scalar(TraceJob& job, TraceCounters& counters) {
+template <TriangleTest kTest>
+void trace_job(TraceJob& job, TraceCounters& counters) {
   const TreeletView treelet(job.page);
   const Ray& ray = *job.ray;
   const RaySpace& space = job.context->object_space(ray, *job.instance);
@@ -42,16 +41,24 @@ void trace_treelet_scalar(TraceJob& job, TraceCounters& counters) {
     const LeafView leaf = treelet.leaf(leaf_offset(ref));
     job.triangle_tests += leaf.triangle_count;
     for (uint32_t i = 0; i < leaf.triangle_count; ++i) {
-      if (test_triangle(treelet, leaf, leaf_offset(ref), i, space, job, counters)) return;
+      if (test_triangle<kTest>(treelet, leaf, leaf_offset(ref), i, space, job, counters)) return;
     }
   } while (stack.pop(ray.t, ref));
 }
 
+}  // namespace
+
+void trace_treelet_scalar(TraceJob& job, TraceCounters& counters, TriangleTest test) {
+  if (test == TriangleTest::kFast) return trace_job<TriangleTest::kFast>(job, counters);
+  if (test == TriangleTest::kDouble) return trace_job<TriangleTest::kDouble>(job, counters);
+  trace_job<TriangleTest::kWatertight>(job, counters);
+}
+
 void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
-                          Ray& ray, TraceCounters& counters) {
+                          Ray& ray, TraceCounters& counters, TriangleTest test) {
   RayContext context;
   TraceJob job{page.data(), &ray, &context, &instance, entry};
-  trace_treelet_scalar(job, counters);
+  trace_treelet_scalar(job, counters, test);
   counters.node_tests_count += job.node_tests;
   counters.triangle_tests_count += job.triangle_tests;
 }

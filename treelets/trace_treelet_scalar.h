@@ -8,9 +8,9 @@
 namespace shoal {
 
 /// One job of trace_treelets(); its tests are counted in the job only.
-void trace_treelet_scalar(TraceJob& job, TraceCounters& counters);
+void trace_treelet_scalar(TraceJob& job, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
 /// As trace_treelet().
 void trace_treelet_scalar(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
-                          Ray& ray, TraceCounters& counters);
+                          Ray& ray, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
 
 }  // namespace shoal

@@ -59,6 +59,7 @@ class LaneList {
   uint8_t lanes_[kTraceLanes];
 };
 
+template <TriangleTest kTest>
 class Tracer {
  public:
   Tracer(std::span<TraceJob> jobs, TraceCounters& counters) : jobs_(jobs), counters_(counters) {}
@@ -82,7 +83,7 @@ class Tracer {
       TraceJob& job = jobs_[next_job_++];
       const RaySpace& space = prepare(job);
       if (HWY_UNLIKELY(space.extreme)) {
-        trace_treelet_scalar(job, counters_);
+        trace_treelet_scalar(job, counters_, kTest);
         continue;
       }
       TraceLane& lane = lanes_[index];
@@ -152,7 +153,7 @@ class Tracer {
       TraceLane& lane = lanes_[list[i]];
       const LeafView leaf = lane.leaf();
       lane.job->triangle_tests += leaf.triangle_count;
-      lane.candidates = find_candidates(*lane.space, leaf, lane.job->ray->t);
+      lane.candidates = find_candidates<kTest>(*lane.space, leaf, lane.job->ray->t);
     }
     for (uint32_t i = 0; i < list.size(); ++i) {
       TraceLane& lane = lanes_[list[i]];
@@ -168,7 +169,7 @@ class Tracer {
       const uint32_t i = static_cast<uint32_t>(std::countr_zero(mask));
       TriangleHit hit;
       Ray& ray = *lane.job->ray;
-      if (intersect_stored(*lane.space, leaf, i, ray.t, hit) &&
+      if (intersect_stored_by<kTest>(*lane.space, leaf, i, ray.t, hit) &&
           take_hit(treelet, leaf, leaf_offset(lane.ref), i, hit, ray, lane.job->entry.treelet, counters_)) {
         lane.size = 0;  // an any-hit ray is done
         return;
@@ -183,7 +184,15 @@ class Tracer {
   TraceLane lanes_[kTraceLanes];
 };
 
-void trace(std::span<TraceJob> jobs, TraceCounters& counters) { Tracer(jobs, counters).run(); }
+void trace(std::span<TraceJob> jobs, TraceCounters& counters) {
+  Tracer<TriangleTest::kWatertight>(jobs, counters).run();
+}
+void trace_fast(std::span<TraceJob> jobs, TraceCounters& counters) {
+  Tracer<TriangleTest::kFast>(jobs, counters).run();
+}
+void trace_double(std::span<TraceJob> jobs, TraceCounters& counters) {
+  Tracer<TriangleTest::kDouble>(jobs, counters).run();
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
@@ -193,9 +202,17 @@ HWY_AFTER_NAMESPACE();
 namespace shoal {
 
 HWY_EXPORT(trace);
+HWY_EXPORT(trace_fast);
+HWY_EXPORT(trace_double);
 
-void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters) {
-  HWY_DYNAMIC_DISPATCH(trace)(jobs, counters);
+void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test) {
+  if (HWY_LIKELY(test == TriangleTest::kWatertight)) {
+    HWY_DYNAMIC_DISPATCH(trace)(jobs, counters);
+  } else if (test == TriangleTest::kFast) {
+    HWY_DYNAMIC_DISPATCH(trace_fast)(jobs, counters);
+  } else {
+    HWY_DYNAMIC_DISPATCH(trace_double)(jobs, counters);
+  }
   for (const TraceJob& job : jobs) {
     counters.node_tests_count += job.node_tests;
     counters.triangle_tests_count += job.triangle_tests;
@@ -203,15 +220,15 @@ void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters) {
 }
 
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
-                   RayContext& context, TraceCounters& counters) {
+                   RayContext& context, TraceCounters& counters, TriangleTest test) {
   TraceJob job{page.data(), &ray, &context, &instance, entry};
-  trace_treelets({&job, 1}, counters);
+  trace_treelets({&job, 1}, counters, test);
 }
 
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
-                   TraceCounters& counters) {
+                   TraceCounters& counters, TriangleTest test) {
   RayContext context;
-  trace_treelet(page, entry, instance, ray, context, counters);
+  trace_treelet(page, entry, instance, ray, context, counters, test);
 }
 
 }  // namespace shoal

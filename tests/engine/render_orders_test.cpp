@@ -168,6 +168,14 @@ class RenderOrders : public ::testing::Test {
 
 TEST_F(RenderOrders, AgreeOnTerrain) { expect_one_picture(generated("terrain", 60000), small_picture(0)); }
 
+TEST_F(RenderOrders, AgreeByEveryTriangleTest) {
+  for (const TriangleTest test : {TriangleTest::kFast, TriangleTest::kDouble}) {
+    PictureOptions picture = small_picture(0.5f);
+    picture.shading.triangle_test = test;
+    expect_one_picture(generated("instances", 30000), picture);
+  }
+}
+
 TEST_F(RenderOrders, AgreeOnInstancesWithCoverage) {
   expect_one_picture(generated("instances", 300000), small_picture(0.5f));
 }

@@ -36,32 +36,53 @@ void on_every_instruction_set(const Run& run) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-/// The rays at their ends, by TopTree::next and `trace` (trace_treelet, trace_treelet_scalar): the depth-first way.
-inline std::vector<Ray> trace_one_by_one(const TopTree& tree, const TestScene& scene, std::vector<Ray> rays,
-                                         TraceFunction trace) {
-  for (Ray& ray : rays) trace_scene(tree, scene.pages, ray, trace);
+/// The rays at their ends, by TopTree::next and `trace(page, entry, instance, ray)`: the way of the depth-first order,
+/// and with waits in between of the queued one.
+template <class Trace>
+std::vector<Ray> trace_one_by_one(const TopTree& tree, const TestScene& scene, std::vector<Ray> rays,
+                                  const Trace& trace) {
+  for (Ray& ray : rays) {
+    uint64_t node_tests = 0;
+    ray.cursor = ray.instance = kNoIndex, ray.more = 0;
+    while (!(ray.any_hit() && ray.hit.valid())) {
+      const uint32_t entry = tree.next(ray, node_tests);
+      if (entry == kNoIndex) break;
+      const TreeletEntry& e = tree.entry(entry);
+      trace(scene.pages[e.treelet].bytes(), e, tree.instance(ray.instance), ray);
+    }
+    if (ray.any_hit()) ray.cursor = ray.instance = kNoIndex, ray.more = 0;
+  }
   return rays;
 }
 
-/// Traces `rays` every way on every instruction set and expects the same bits of all: of closest-hit rays the whole
-/// ray, of any-hit rays whether they hit. Returns the rays at their ends.
-inline std::vector<Ray> trace_every_way(const TestScene& scene, const std::vector<Ray>& rays) {
+inline int64_t primitive_or_none(const Ray& ray) { return ray.hit.valid() ? int64_t{ray.hit.primitive} : -1; }
+
+/// The same bits of all: of closest-hit rays the whole ray, of any-hit rays whether they hit.
+inline void expect_same_ends(const char* target, const char* way, const std::vector<Ray>& expected,
+                             const std::vector<Ray>& found) {
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const bool same = expected[i].any_hit() ? expected[i].hit.valid() == found[i].hit.valid()
+                                            : std::memcmp(&expected[i], &found[i], sizeof(Ray)) == 0;
+    ASSERT_TRUE(same) << target << ", " << way << ": ray " << i << " ends at t " << found[i].t << " on primitive "
+                      << primitive_or_none(found[i]) << ", the scalar reference at t " << expected[i].t << " on "
+                      << primitive_or_none(expected[i]);
+  }
+}
+
+/// Traces `rays` every way on every instruction set and expects the same bits. Returns the rays at their ends.
+inline std::vector<Ray> trace_every_way(const TestScene& scene, const std::vector<Ray>& rays,
+                                        TriangleTest test = TriangleTest::kWatertight) {
   const TopTree tree(scene.nodes, scene.entries, scene.instances);
-  const std::vector<Ray> expected = trace_one_by_one(tree, scene, rays, trace_treelet_scalar);
-  const auto compare = [&](const char* target, const char* way, const std::vector<Ray>& found) {
-    for (size_t i = 0; i < rays.size(); ++i) {
-      const bool same = rays[i].any_hit() ? expected[i].hit.valid() == found[i].hit.valid()
-                                          : std::memcmp(&expected[i], &found[i], sizeof(Ray)) == 0;
-      ASSERT_TRUE(same) << target << ", " << way << ": ray " << i << " ends at t " << found[i].t << " on primitive "
-                        << static_cast<int64_t>(found[i].hit.valid() ? int64_t{found[i].hit.primitive} : -1)
-                        << ", the scalar reference at t " << expected[i].t << " on "
-                        << static_cast<int64_t>(expected[i].hit.valid() ? int64_t{expected[i].hit.primitive} : -1);
-    }
-  };
+  TraceCounters counters;
+  const auto scalar = [&](std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
+                          Ray& ray) { trace_treelet_scalar(page, entry, instance, ray, counters, test); };
+  const auto kernel = [&](std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance,
+                          Ray& ray) { trace_treelet(page, entry, instance, ray, counters, test); };
+  const std::vector<Ray> expected = trace_one_by_one(tree, scene, rays, scalar);
   on_every_instruction_set([&](const char* target) {
-    compare(target, "treelet by treelet", trace_one_by_one(tree, scene, rays, trace_treelet));
-    compare(target, "single rays", trace_together(tree, scene, rays, RayGrouping::kSingle));
-    compare(target, "packets", trace_together(tree, scene, rays, RayGrouping::kPackets));
+    expect_same_ends(target, "treelet by treelet", expected, trace_one_by_one(tree, scene, rays, kernel));
+    expect_same_ends(target, "single rays", expected, trace_together(tree, scene, rays, RayGrouping::kSingle, test));
+    expect_same_ends(target, "packets", expected, trace_together(tree, scene, rays, RayGrouping::kPackets, test));
   });
   return expected;
 }

@@ -184,12 +184,12 @@ inline void trace_scene(const TopTree& tree, std::span<const AlignedPage> pages,
 }
 
 /// Every triangle of every instance, with the same triangle test.
-inline void brute_force(const TestScene& scene, Ray& ray) {
+inline void brute_force(const TestScene& scene, Ray& ray, TriangleTest test = TriangleTest::kWatertight) {
   for (uint32_t i = 0; i < scene.instances.size(); ++i) {
     const RaySpace space = to_object_space(ray, scene.instances[i]);
     for (const TestTriangle& t : scene.objects[scene.instances[i].object]) {
       TriangleHit hit;
-      if (!intersect_triangle(space, t.p[0], t.p[1], t.p[2], ray.t, hit)) continue;
+      if (!intersect_triangle(test, space, t.p[0], t.p[1], t.p[2], ray.t, hit)) continue;
       if (ray.any_hit() ? !(hit.t < ray.t) : !comes_before(ray, hit.t, i, t.primitive)) continue;
       ray.hit = {i, t.primitive, 0, 0};
       if (ray.any_hit()) return;

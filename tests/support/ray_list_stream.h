@@ -46,10 +46,11 @@ class RayListStream final : public RayStream {
 
 /// All of them from start to end, by SceneTracer: the rays at their ends.
 inline std::vector<Ray> trace_together(const TopTree& tree, const TestScene& scene, std::vector<Ray> rays,
-                                       RayGrouping grouping) {
+                                       RayGrouping grouping,
+                                       TriangleTest test = TriangleTest::kWatertight) {
   RayListStream stream(rays, scene);
   TraceCounters counters;
-  SceneTracer(tree, stream.table.data(), grouping).trace(stream, counters);
+  SceneTracer(tree, stream.table.data(), grouping, test).trace(stream, counters);
   EXPECT_EQ(stream.done_count, rays.size());
   EXPECT_LE(stream.brought, scene.pages.size());
   return rays;
