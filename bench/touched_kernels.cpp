@@ -209,7 +209,7 @@ class TouchingWalker {
   Lane lanes_[bench::kTouchedLanes];
 };
 
-/// As Tracer of treelets/trace_treelets.cpp.
+/// As Tracer of treelets/treelet_tracer-inl.h.
 class TouchingTracer {
  public:
   TouchingTracer(std::span<TraceJob> jobs, TraceCounters& counters, TouchMeter& meter)
