@@ -37,24 +37,21 @@ HWY_INLINE V4 load_corners(const LeafView& leaf, uint32_t axis, const uint32_t v
   return V4{lanes_set(at(vertex[0]), at(vertex[1]), at(vertex[2]))};
 }
 
-HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float t_max, TriangleHit& hit) {
+/// Sheared corners, a lane each.
+struct ShearedCorners {
+  V4 x, y, z;
+};
+
+/// The edge functions of c b, a c, b a and t, in double: TriangleTest::kWatertight.
+HWY_INLINE bool cross_line_lanes(const RaySpace& ray, const ShearedCorners& at, TriangleHit& hit, hn::Vec<D4>& weights) {
   const F4 f;
   const D4 d;
-  // Sheared corners, a lane each.
-  HWY_ALIGN float words[3][4];
-  for (int axis = 0; axis < 3; ++axis) hn::Store(corners[axis], f, words[axis]);
-  const auto z = hn::Sub(hn::Load(f, words[ray.kz]), hn::Set(f, ray.origin[ray.kz]));
-  const auto x = hn::Sub(hn::Sub(hn::Load(f, words[ray.kx]), hn::Set(f, ray.origin[ray.kx])),
-                         hn::Mul(hn::Set(f, ray.shear_x), z));
-  const auto y = hn::Sub(hn::Sub(hn::Load(f, words[ray.ky]), hn::Set(f, ray.origin[ray.ky])),
-                         hn::Mul(hn::Set(f, ray.shear_y), z));
-  // Edge functions of c b, a c, b a.
   HWY_ALIGN static constexpr int32_t kEdgeFrom[4] = {2, 0, 1, 3}, kEdgeTo[4] = {1, 2, 0, 3};
   const auto cab = hn::SetTableIndices(f, kEdgeFrom), bca = hn::SetTableIndices(f, kEdgeTo);
-  const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(x, cab));
-  const auto from_y = hn::PromoteTo(d, hn::TableLookupLanes(y, cab));
-  const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(x, bca));
-  const auto to_y = hn::PromoteTo(d, hn::TableLookupLanes(y, bca));
+  const auto from_x = hn::PromoteTo(d, hn::TableLookupLanes(at.x, cab));
+  const auto from_y = hn::PromoteTo(d, hn::TableLookupLanes(at.y, cab));
+  const auto to_x = hn::PromoteTo(d, hn::TableLookupLanes(at.x, bca));
+  const auto to_y = hn::PromoteTo(d, hn::TableLookupLanes(at.y, bca));
   const auto edge = hn::Sub(hn::Mul(from_x, to_y), hn::Mul(from_y, to_x));
   const auto corner = hn::FirstN(d, 3);
   const auto none = hn::Zero(d);
@@ -64,27 +61,72 @@ HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float 
   const bool positive = !hn::AllFalse(d, hn::And(corner, hn::Gt(edge, none)));
   if ((negative & positive) | (det == 0)) return false;
   const double inverse = 1 / det;
-  const auto b = hn::Mul(edge, hn::Set(d, inverse));
-  const auto bz = hn::Mul(b, hn::PromoteTo(d, z));
+  weights = hn::Mul(edge, hn::Set(d, inverse));
+  const auto bz = hn::Mul(weights, hn::PromoteTo(d, at.z));
   const double sum = hn::ExtractLane(bz, 0) + hn::ExtractLane(bz, 1) + hn::ExtractLane(bz, 2);
   hit.t = static_cast<float>(sum / ray.direction[ray.kz]);
+  return true;
+}
 
+/// The same in float: TriangleTest::kFast.
+HWY_INLINE bool cross_line_lanes(const RaySpace& ray, const ShearedCorners& at, TriangleHit& hit, V4& weights) {
+  const F4 f;
+  HWY_ALIGN static constexpr int32_t kEdgeFrom[4] = {2, 0, 1, 3}, kEdgeTo[4] = {1, 2, 0, 3};
+  const auto cab = hn::SetTableIndices(f, kEdgeFrom), bca = hn::SetTableIndices(f, kEdgeTo);
+  const auto edge = hn::Sub(hn::Mul(hn::TableLookupLanes(at.x, cab), hn::TableLookupLanes(at.y, bca)),
+                            hn::Mul(hn::TableLookupLanes(at.y, cab), hn::TableLookupLanes(at.x, bca)));
+  const float eu = hn::ExtractLane(edge, 0), ev = hn::ExtractLane(edge, 1), ew = hn::ExtractLane(edge, 2);
+  const float det = eu + ev + ew, size = std::abs(det);
+  // Edges of both signs were left out with the whole leaf, by the same bits (float_edges_differ()).
+  if (!(size >= std::numeric_limits<float>::min() && size <= std::numeric_limits<float>::max())) return false;
+  weights = hn::Mul(edge, hn::Set(f, 1 / det));
+  const auto bz = hn::Mul(weights, at.z);
+  const float sum = hn::ExtractLane(bz, 0) + hn::ExtractLane(bz, 1) + hn::ExtractLane(bz, 2);
+  hit.t = sum / ray.direction[ray.kz];
+  return true;
+}
+
+/// `Weights`: the vector of their type, which says by which kind of test.
+template <class Weights>
+HWY_INLINE bool intersect_lanes(const RaySpace& ray, const V4 corners[3], float t_max, TriangleHit& hit) {
+  const F4 f;
+  HWY_ALIGN float words[3][4];
+  for (int axis = 0; axis < 3; ++axis) hn::Store(corners[axis], f, words[axis]);
+  const auto z = hn::Sub(hn::Load(f, words[ray.kz]), hn::Set(f, ray.origin[ray.kz]));
+  const auto x = hn::Sub(hn::Sub(hn::Load(f, words[ray.kx]), hn::Set(f, ray.origin[ray.kx])),
+                         hn::Mul(hn::Set(f, ray.shear_x), z));
+  const auto y = hn::Sub(hn::Sub(hn::Load(f, words[ray.ky]), hn::Set(f, ray.origin[ray.ky])),
+                         hn::Mul(hn::Set(f, ray.shear_y), z));
+  Weights weights;
+  if (!cross_line_lanes(ray, {x, y, z}, hit, weights)) return false;
   const BoxSpan span = triangle_test::cross_own_box(
       ray, lanes_set(words[0][0], words[1][0], words[2][0]), lanes_set(words[0][1], words[1][1], words[2][1]),
       lanes_set(words[0][2], words[1][2], words[2][2]));
   if (!span.entered(t_max)) return false;
   hit.t = std::min(std::max(hit.t, span.t_near), span.t_far);
   if (!(hit.t > 0 && hit.t <= t_max)) return false;
-  hit.b1 = static_cast<float>(hn::ExtractLane(b, 1));
-  hit.b2 = static_cast<float>(hn::ExtractLane(b, 2));
+  hit.b1 = static_cast<float>(hn::ExtractLane(weights, 1));
+  hit.b2 = static_cast<float>(hn::ExtractLane(weights, 2));
   return true;
+}
+
+template <class Weights>
+HWY_INLINE bool intersect_corners(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max,
+                                  TriangleHit& hit) {
+  const uint32_t vertex[3] = {leaf.corner(0)[i], leaf.corner(1)[i], leaf.corner(2)[i]};
+  const V4 corners[3] = {load_corners(leaf, 0, vertex), load_corners(leaf, 1, vertex), load_corners(leaf, 2, vertex)};
+  return intersect_lanes<Weights>(ray, corners, t_max, hit);
 }
 
 /// intersect_triangle() of triangle `i`.
 HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max, TriangleHit& hit) {
-  const uint32_t vertex[3] = {leaf.corner(0)[i], leaf.corner(1)[i], leaf.corner(2)[i]};
-  const V4 corners[3] = {load_corners(leaf, 0, vertex), load_corners(leaf, 1, vertex), load_corners(leaf, 2, vertex)};
-  return intersect_lanes(ray, corners, t_max, hit);
+  return intersect_corners<hn::Vec<D4>>(ray, leaf, i, t_max, hit);
+}
+
+/// The same by TriangleTest::kFast. Requires: the triangle is one of find_candidates<TriangleTest::kFast>().
+HWY_INLINE bool intersect_stored_fast(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max,
+                                      TriangleHit& hit) {
+  return intersect_corners<V4>(ray, leaf, i, t_max, hit);
 }
 
 #else
@@ -93,13 +135,20 @@ HWY_INLINE bool intersect_stored(const RaySpace& ray, const LeafView& leaf, uint
   return intersect_triangle(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), t_max, hit);
 }
 
+HWY_INLINE bool intersect_stored_fast(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max,
+                                      TriangleHit& hit) {
+  return intersect_triangle<TriangleTest::kFast>(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2),
+                                                 t_max, hit);
+}
+
 #endif
 
-/// The same for any kind of test; only the default has a form in lanes.
+/// The same for any kind of test; TriangleTest::kDouble has no form in lanes. Requires: as intersect_stored_fast().
 template <TriangleTest kTest>
 HWY_INLINE bool intersect_stored_by(const RaySpace& ray, const LeafView& leaf, uint32_t i, float t_max,
                                     TriangleHit& hit) {
   if constexpr (kTest == TriangleTest::kWatertight) return intersect_stored(ray, leaf, i, t_max, hit);
+  if constexpr (kTest == TriangleTest::kFast) return intersect_stored_fast(ray, leaf, i, t_max, hit);
   return intersect_triangle<kTest>(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), t_max, hit);
 }
 
