@@ -166,7 +166,7 @@ inline TestScene make_scene(std::vector<std::vector<TestTriangle>> objects,
 }
 
 using TraceFunction = void (*)(std::span<const std::byte>, const TreeletEntry&, const Instance&, Ray&,
-                               TraceCounters&);
+                               TraceCounters&, TriangleTest);
 
 /// Carries one ray through the whole scene, as an engine does.
 inline void trace_scene(const TopTree& tree, std::span<const AlignedPage> pages, Ray& ray, TraceFunction trace,
@@ -178,7 +178,7 @@ inline void trace_scene(const TopTree& tree, std::span<const AlignedPage> pages,
     if (entry == kNoIndex) return;
     if (visited) visited->push_back(entry);
     const TreeletEntry& e = tree.entry(entry);
-    trace(pages[e.treelet].bytes(), e, tree.instance(ray.instance), ray, counters);
+    trace(pages[e.treelet].bytes(), e, tree.instance(ray.instance), ray, counters, TriangleTest::kWatertight);
     if (ray.any_hit() && ray.hit.valid()) return;
   }
 }
