@@ -79,6 +79,16 @@ AccuracyKnob light_choice_knob() {
                                                                     {"tree", LightChoice::kTree}})};
 }
 
+AccuracyKnob triangle_test_knob() {
+  return {"triangle-test", "--triangle-test",
+          "By which arithmetic rays meet triangles: float, where light may pass between two; exact signs; double as well.",
+          true, false,
+          values_at([](auto& s) -> auto& { return s.picture.shading.triangle_test; },
+                    std::vector<std::pair<std::string, TriangleTest>>{{"fast", TriangleTest::kFast},
+                                                                     {"watertight", TriangleTest::kWatertight},
+                                                                     {"double", TriangleTest::kDouble}})};
+}
+
 }  // namespace
 
 size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
@@ -89,7 +99,8 @@ size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
 }
 
 std::vector<AccuracyKnob> accuracy_knobs(const AccuracySettings& base) {
-  return {samples_knob(base), bounces_knob(base), roulette_knob(base), texture_filter_knob(), light_choice_knob()};
+  return {samples_knob(base), bounces_knob(base), roulette_knob(base), texture_filter_knob(), light_choice_knob(),
+          triangle_test_knob()};
 }
 
 Result<std::vector<AccuracyKnob>> choose_knobs(std::vector<AccuracyKnob> knobs, const std::vector<std::string>& names) {

@@ -45,7 +45,7 @@ class Oracle {
     largest_ = max_abs_of(bounds_of(triangles));
   }
 
-  /// Compares the end of a closest-hit ray that began with `t_max`.
+  /// Compares the end of a closest-hit ray, `begun` in the triangles' space.
   void judge(const Ray& begun, const Ray& found, Agreement& sum) const {
     const RaySpace space = space_of(begun);
     ++sum.rays;
@@ -135,15 +135,21 @@ std::vector<Ray> sly_rays(const std::vector<TestTriangle>& triangles, std::mt199
   return rays;
 }
 
+/// The triangles as one instance under `map`; the oracle has the ray that it sees, rounded in its space.
 Agreement compare_with_exact(const std::vector<TestTriangle>& triangles, const std::vector<Ray>& rays,
-                             TriangleTest test) {
-  const TestScene scene = make_scene({triangles}, {{0, {}}}, {8, 4});
+                             TriangleTest test, const Affine3& map = {}) {
+  const TestScene scene = make_scene({triangles}, {{0, map}}, {8, 4});
   const std::vector<Ray> found = trace_every_way(scene, rays, test);
   const Oracle oracle(triangles, test);
   Agreement sum;
   for (size_t i = 0; i < rays.size() && !::testing::Test::HasFatalFailure(); ++i) {
     SCOPED_TRACE("ray " + std::to_string(i));
-    oracle.judge(rays[i], found[i], sum);
+    Ray seen = rays[i];
+    if (map != Affine3{}) {
+      seen.origin = scene.instances[0].world_to_object.point(seen.origin);
+      seen.direction = scene.instances[0].world_to_object.vector(seen.direction);
+    }
+    oracle.judge(seen, found[i], sum);
   }
   return sum;
 }
@@ -155,14 +161,15 @@ void add(Agreement& sum, const Agreement& part) {
 
 /// `change` alters a soup and its rays together.
 template <class Change>
-void expect_within_bounds(const char* name, TriangleTest test, size_t count, const Change& change) {
+void expect_within_bounds(const char* name, TriangleTest test, size_t count, const Change& change,
+                          const Affine3& map = {}) {
   std::mt19937 random(7);
   Agreement sum;
   for (size_t done = 0; done < count && !::testing::Test::HasFatalFailure(); done += 500) {
     auto soup = done % 1000 == 0 ? random_soup(random, 24, 0.7f) : closed_mesh(4, 6, 0.1f);
     auto rays = sly_rays(soup, random, 500);
     change(soup, rays, random);
-    add(sum, compare_with_exact(soup, rays, test));
+    add(sum, compare_with_exact(soup, rays, test, map));
   }
   EXPECT_GT(sum.hits, sum.rays / 8);
   EXPECT_GT(sum.misses, sum.rays / 100);
@@ -192,6 +199,36 @@ TEST(AgainstExact, WhateverTheScale) {
         for (Ray& ray : rays) ray.origin *= by;
       };
       expect_within_bounds(("times 2^" + std::to_string(power)).c_str(), test, rays_to_try(2000), scale);
+    }
+  }
+}
+
+TEST(AgainstExact, WhateverTheLengthOfDirections) {
+  for (const TriangleTest test : kBounded) {
+    for (const int power : {-110, -60, 60, 110}) {
+      const auto stretch = [power](std::vector<TestTriangle>&, std::vector<Ray>& rays, std::mt19937&) {
+        for (Ray& ray : rays) ray.direction *= std::ldexp(1.0f, power);
+      };
+      expect_within_bounds(("directions times 2^" + std::to_string(power)).c_str(), test, rays_to_try(2000), stretch);
+    }
+  }
+}
+
+TEST(AgainstExact, AsAnInstance) {
+  const std::pair<const char*, Affine3> maps[] = {
+      {"scaled by 1e-3 to 1e3", {{1000, 0, 0}, {0, 1, 0}, {0, 0, 1e-3f}, {-3, 0, 100}}},
+      {"sheared and mirrored", {{-1, 0, 0}, {30, 1, 0}, {-7, 20, 1}, {1, 1, 1}}},
+      {"turned", {{0.3f, 0.5f, -0.7f}, {0.6f, -0.8f, 0.2f}, {-0.4f, 0.1f, 0.9f}, {0.1f, -20, 3}}}};
+  for (const TriangleTest test : kBounded) {
+    for (const auto& [name, map] : maps) {
+      const auto place = [&to_world = map](std::vector<TestTriangle>&, std::vector<Ray>& rays, std::mt19937&) {
+        for (Ray& ray : rays) {
+          const Vec3 target = to_world.point(ray.origin + ray.direction);
+          ray.origin = to_world.point(ray.origin);
+          ray.direction = target - ray.origin;
+        }
+      };
+      expect_within_bounds(name, test, rays_to_try(2000), place, map);
     }
   }
 }
