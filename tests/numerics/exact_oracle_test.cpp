@@ -259,29 +259,43 @@ TEST(AgainstExact, SliversAndFarAway) {
   }
 }
 
-TEST(AgainstExact, DuplicatesResolveToTheSmallestId) {
+/// Copies of every triangle, `turned`: with their corners in other orders. Returns the rays that did not end on the first.
+size_t hits_of_copies(TriangleTest test, bool turned, size_t& hits) {
   std::mt19937 random(3);
-  size_t hits = 0;
+  size_t others = 0;
   for (int round = 0; round < 20; ++round) {
     const auto original = random_soup(random, 30, 0.6f);
     std::vector<TestTriangle> soup;
     for (uint32_t copy = 0; copy < 4; ++copy) {
       for (TestTriangle t : original) {
         t.primitive += 30 * copy;
+        if (turned) std::rotate(t.p, t.p + copy % 3, t.p + 3);
+        if (turned && copy == 3) std::swap(t.p[0], t.p[1]);
         soup.push_back(t);
       }
     }
     std::shuffle(soup.begin(), soup.end(), random);
     const TestScene scene = make_scene({soup}, {{0, {}}}, {20, 3});
-    for (const TriangleTest test : {TriangleTest::kFast, TriangleTest::kWatertight, TriangleTest::kDouble}) {
-      for (const Ray& ray : trace_every_way(scene, sly_rays(original, random, 300), test)) {
-        if (!ray.hit.valid()) continue;
-        ++hits;
-        ASSERT_LT(ray.hit.primitive, 30u) << triangle_test_name(test);
-      }
+    for (const Ray& ray : trace_every_way(scene, sly_rays(original, random, 300), test)) {
+      if (!ray.hit.valid()) continue;
+      ++hits;
+      others += ray.hit.primitive < 30 ? 0 : 1;
     }
   }
-  EXPECT_GT(hits, 6000u);
+  return others;
+}
+
+TEST(AgainstExact, DuplicatesResolveToTheSmallestId) {
+  for (const TriangleTest test : {TriangleTest::kFast, TriangleTest::kWatertight, TriangleTest::kDouble}) {
+    size_t hits = 0, turned_hits = 0;
+    EXPECT_EQ(hits_of_copies(test, false, hits), 0u);
+    EXPECT_GT(hits, 2000u);
+    // With corners in another order sums of three may differ in their last bit, in double seldom so that t does.
+    const size_t others = hits_of_copies(test, true, turned_hits);
+    EXPECT_LE(others, test == TriangleTest::kFast ? turned_hits : turned_hits / 1000);
+    std::printf("[numerics] copies with their corners in another order, %s: %zu hits, %zu on a copy\n",
+                std::string(triangle_test_name(test)).c_str(), turned_hits, others);
+  }
 }
 
 }  // namespace
