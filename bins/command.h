@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -21,6 +23,10 @@ void declare_verify(CLI::App& app, Console& console, Command& command);
 void declare_diff(CLI::App& app, Console& console, Command& command);
 void declare_generate(CLI::App& app, Console& console, Command& command);
 
+/// `behind_dashes`: the words behind --, which CLI11 would take for positional ones.
+void declare_batch(CLI::App& app, Console& console, Command& command, const std::vector<std::string>& behind_dashes);
+
+inline constexpr int kExitBatchFailed = 8;
 inline constexpr int kExitPicturesDiffer = 10;
 
 }  // namespace shoal

@@ -1,13 +1,18 @@
-// shoal: one program, one subcommand a task (docs/design.md). Exit codes: ErrorCode, and 10 of `diff`.
+// shoal: one program, one subcommand a task (docs/design.md). Exit codes: ErrorCode, 8 of `batch` and 10 of `diff`.
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <map>
 #include <new>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "engine/process_memory.h"
+#include "io/child_process.h"
 
 namespace {
 
@@ -25,17 +30,29 @@ void declare_console(CLI::App& app, shoal::Console& console, bool& quiet) {
   app.add_flag("--quiet", quiet, "errors only");
 }
 
+/// The words behind -- of `shoal batch`, which are no longer among the arguments afterwards.
+std::vector<std::string> cut_behind_dashes(int& argc, char** argv) {
+  if (argc < 2 || std::string_view(argv[1]) != "batch") return {};
+  char** const end = argv + argc;
+  char** const dashes = std::find_if(argv, end, [](const char* word) { return std::string_view(word) == "--"; });
+  if (dashes == end) return {};
+  argc = static_cast<int>(dashes - argv);
+  return {dashes + 1, end};
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Shoal renders glTF scenes bigger than memory.", "shoal"};
   app.set_version_flag("--version", "shoal " SHOAL_VERSION);
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done, 1 a bug of ours, 2 usage, 3 input missing or invalid, 4 a required extension is not "
              "supported,\n5 the memory cap cannot work or memory ran out, 6 disk full or I/O error, 7 a corrupt .shoal "
-             "file, 9 stopped, 10 (diff) the pictures differ.");
+             "file, 8 (batch) some scenes failed, 9 stopped, 10 (diff) the pictures differ.");
   shoal::Console console;
   shoal::Command command;
   shoal::declare_build(app, console, command);
   shoal::declare_render(app, console, command);
+  const std::vector<std::string> behind_dashes = cut_behind_dashes(argc, argv);
+  shoal::declare_batch(app, console, command, behind_dashes);
   shoal::declare_compare(app, console, command);
   shoal::declare_accuracy(app, console, command);
   shoal::declare_info(app, console, command);
@@ -58,6 +75,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!shoal::end_with_parent()) return static_cast<int>(shoal::ErrorCode::kStopped);
   shoal::give_back_when_freed();
   std::signal(SIGXFSZ, SIG_IGN);  // a file larger than the user's limit is an error to report, not an end
   try {

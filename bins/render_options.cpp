@@ -34,8 +34,14 @@ std::filesystem::path default_cache_folder() {
   return std::filesystem::path(home != nullptr ? home : "/tmp") / ".cache" / "shoal";
 }
 
-/// The .shoal of a glTF: built into the cache folder unless it is there already.
-Result<std::string> find_or_build(const RenderArguments& arguments, PreparedRender& prepared, Console& console) {
+/// The .shoal of a glTF.
+struct BuiltScene {
+  std::string path;
+  bool anew = false;
+};
+
+/// Built into the cache folder unless it is there already.
+Result<BuiltScene> find_or_build(const RenderArguments& arguments, PreparedRender& prepared, Console& console) {
   FileSystem& fs = posix_file_system();
   SceneBuildOptions options = prepared.build;
   SHOAL_ASSIGN_OR_RETURN(const uint64_t key, build_cache_key(fs, arguments.scene, options));
@@ -45,7 +51,7 @@ Result<std::string> find_or_build(const RenderArguments& arguments, PreparedRend
   std::filesystem::create_directories(folder, code);
   if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", folder.string(), code.message())};
   const std::string path = (folder / fmt::format("{:016x}.shoal", key)).string();
-  if (std::filesystem::exists(path, code)) return path;
+  if (std::filesystem::exists(path, code)) return BuiltScene{path, false};
   console.info(fmt::format("building {} into {}", arguments.scene, path));
   options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
@@ -55,7 +61,7 @@ Result<std::string> find_or_build(const RenderArguments& arguments, PreparedRend
   if (!report.ok()) return std::move(report).error();
   for (const std::string& warning : report.value().warnings) console.warning(warning);
   prepared.build_seconds = report.value().seconds;
-  return path;
+  return BuiltScene{path, true};
 }
 
 Status choose_sky(const std::string& asked, PreparedRender& prepared, Console& console) {
@@ -300,6 +306,8 @@ void RenderArguments::declare(CLI::App& app) {
                                               "that of the built scene)");
   app.add_option("--cache-dir", cache_folder,
                  "where built scenes are kept (default: $XDG_CACHE_HOME/shoal, else ~/.cache/shoal)");
+  app.add_flag("--discard-built", discard_built,
+               "do not keep the scene that is built: its file has no name any more once it is open");
 }
 
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
@@ -324,12 +332,15 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
   }
   if (arguments.adjust_build) arguments.adjust_build(build);
-  std::string path = arguments.scene;
-  if (!is_shoal_file(path)) {
-    SHOAL_ASSIGN_OR_RETURN(path, find_or_build(arguments, prepared, console));
+  BuiltScene built{arguments.scene, false};
+  if (!is_shoal_file(built.path)) {
+    SHOAL_ASSIGN_OR_RETURN(built, find_or_build(arguments, prepared, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
-  SHOAL_ASSIGN_OR_RETURN(auto file, PageFile::open(posix_file_system(), path, mode));
+  auto opened = PageFile::open(posix_file_system(), built.path, mode);
+  if (built.anew && arguments.discard_built) SHOAL_RETURN_IF_ERROR(posix_file_system().remove(built.path));
+  if (!opened.ok()) return std::move(opened).error();
+  std::unique_ptr<PageFile> file = std::move(opened).value();
   SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, pictures_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
   if (is_shoal_file(arguments.scene)) SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));

@@ -48,7 +48,7 @@ struct RenderArguments {
   PoseOptions pose;
   PictureOptions picture;
   ExecutionOptions execution;
-  bool buffered_reads = false, allow_stale = false;
+  bool buffered_reads = false, allow_stale = false, discard_built = false;
   uint32_t more_levels = 32;
   CLI::Option* samples = nullptr;  ///< --spp
   std::function<void(SceneBuildOptions&)> adjust_build;  ///< may be empty; of the options that a glTF is built with
