@@ -116,11 +116,14 @@ class BatchRun {
   }
 
   Result<BatchResult> run() {
-    SHOAL_RETURN_IF_ERROR(make_state());
+    SHOAL_RETURN_IF_ERROR(fs_.create_folder(paths_.state));
     SHOAL_ASSIGN_OR_RETURN(FileLock lock, FileLock::acquire(paths_.lock(), kOrphanPatience, hooks_.stop));
     lock_ = lock.descriptor();
-    SHOAL_RETURN_IF_ERROR(write_asked(fs_, options_));
     sweep();
+    for (const char* name : {"records", "logs", "thumbnails", "built"}) {
+      SHOAL_RETURN_IF_ERROR(fs_.create_folder(paths_.state + "/" + name));
+    }
+    SHOAL_RETURN_IF_ERROR(write_asked(fs_, options_));
     const ChildWatch watch;
     while (true) {
       if (stopped() && !told_) tell_all();
@@ -141,13 +144,6 @@ class BatchRun {
   bool nothing_waits() const { return next_ == standing_.entries.size() && alone_.empty(); }
   void warn(const std::string& message) const {
     if (hooks_.warning) hooks_.warning(message);
-  }
-
-  Status make_state() {
-    for (const char* name : {"records", "logs", "thumbnails", "built"}) {
-      SHOAL_RETURN_IF_ERROR(fs_.create_folder(paths_.state + "/" + name));
-    }
-    return {};
   }
 
   /// What a batch that was killed, and its renders, left.

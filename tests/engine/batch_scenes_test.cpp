@@ -77,10 +77,14 @@ TEST(FindScenes, WhatCannotBeReadIsSaid) {
   put(folder / "scenes/y.gltf");
   ASSERT_EQ(::mkfifo((folder / "scenes/pipe.gltf").c_str(), 0600), 0);
   ASSERT_EQ(::chmod((folder / "scenes/closed").c_str(), 0), 0);
+  ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
+  const uid_t user = ::geteuid();
+  constexpr uid_t kNobody = 65534;  // root reads every folder
+  ASSERT_EQ(user == 0 ? ::seteuid(kNobody) : 0, 0);
   const auto found = find_scenes({folder / "scenes", {}, {}, ""});
+  ASSERT_EQ(user == 0 ? ::seteuid(user) : 0, 0);
   ::chmod((folder / "scenes/closed").c_str(), 0700);
-  ASSERT_TRUE(found.ok());
-  if (::geteuid() == 0) GTEST_SKIP() << "root reads every folder";
+  ASSERT_TRUE(found.ok()) << found.error().message;
   ASSERT_EQ(found.value().scenes.size(), 1u);
   ASSERT_EQ(found.value().unreadable.size(), 1u);
   EXPECT_THAT(found.value().unreadable[0], HasSubstr("closed"));
@@ -153,7 +157,7 @@ TEST(FolderOptions, BytesOfStrangersNeverDoHarm) {
       else text.insert(at, 1, "{}[],:\"\\0"[random() % 9]);
     }
     const auto options = parse_folder_options(text, "shoal.json", some_rules());
-    if (!options.ok()) EXPECT_EQ(options.error().code, ErrorCode::kInput);
+    EXPECT_TRUE(options.ok() || options.error().code == ErrorCode::kInput) << text;
   }
 }
 
@@ -264,12 +268,19 @@ TEST(BatchRecord, ComesBackAsItWasWritten) {
   ASSERT_TRUE(write_record(fs, "r.json", r).ok());
   const auto read = read_record(fs, "r.json");
   ASSERT_TRUE(read.has_value());
-  EXPECT_EQ(read->scene, r.scene), EXPECT_EQ(read->output, r.output), EXPECT_EQ(read->key, r.key);
-  EXPECT_EQ(read->state, r.state), EXPECT_EQ(read->exit_code, r.exit_code), EXPECT_EQ(read->message, r.message);
-  EXPECT_EQ(read->options, r.options), EXPECT_EQ(read->output_bytes, r.output_bytes);
-  EXPECT_EQ(read->figures.effects, r.figures.effects), EXPECT_EQ(read->figures.samples, 17u);
+  EXPECT_EQ(read->scene, r.scene);
+  EXPECT_EQ(read->output, r.output);
+  EXPECT_EQ(read->key, r.key);
+  EXPECT_EQ(read->state, r.state);
+  EXPECT_EQ(read->exit_code, r.exit_code);
+  EXPECT_EQ(read->message, r.message);
+  EXPECT_EQ(read->options, r.options);
+  EXPECT_EQ(read->output_bytes, r.output_bytes);
+  EXPECT_EQ(read->figures.effects, r.figures.effects);
+  EXPECT_EQ(read->figures.samples, 17u);
   ASSERT_EQ(read->content.files.size(), 2u);
-  EXPECT_EQ(read->content.files[0].path, "/\xff"), EXPECT_EQ(read->content.files[0].hash, ~0ull);
+  EXPECT_EQ(read->content.files[0].path, "/\xff");
+  EXPECT_EQ(read->content.files[0].hash, ~0ull);
   // Written once more it is the same text: nothing was lost.
   ASSERT_TRUE(write_record(fs, "again.json", *read).ok());
   EXPECT_EQ(fs.contents("again.json"), fs.contents("r.json"));
@@ -297,9 +308,12 @@ TEST(BatchAsked, ComesBackAsItWasWritten) {
   ASSERT_TRUE(write_asked(posix_file_system(), options).ok());
   const auto read = read_asked(posix_file_system(), folder.path());
   ASSERT_TRUE(read.ok()) << read.error().message;
-  EXPECT_EQ(read.value().folder, options.folder), EXPECT_EQ(read.value().exclude, options.exclude);
-  EXPECT_EQ(read.value().common, options.common), EXPECT_EQ(read.value().forced, options.forced);
-  EXPECT_EQ(read.value().jobs, 3u), EXPECT_EQ(read.value().max_memory_bytes, 1ull << 33);
+  EXPECT_EQ(read.value().folder, options.folder);
+  EXPECT_EQ(read.value().exclude, options.exclude);
+  EXPECT_EQ(read.value().common, options.common);
+  EXPECT_EQ(read.value().forced, options.forced);
+  EXPECT_EQ(read.value().jobs, 3u);
+  EXPECT_EQ(read.value().max_memory_bytes, 1ull << 33);
   put(folder / ".batch/batch.json", "{\"schema_version\": 1}");
   EXPECT_FALSE(read_asked(posix_file_system(), folder.path()).ok());
 }

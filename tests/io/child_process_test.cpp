@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -136,6 +137,7 @@ TEST(ChildProcess, AParentThatIsGoneIsNoticed) {
   EXPECT_EQ(end_with_parent(), ::getppid() == 1);
   EXPECT_EQ(::getenv("SHOAL_PARENT"), nullptr);
   EXPECT_TRUE(end_with_parent()) << "nobody asked";
+  ::prctl(PR_SET_PDEATHSIG, 0);
 }
 
 TEST(ChildProcess, KnowsItsOwnProgram) {
