@@ -155,6 +155,7 @@ class BatchRun {
       files.push_back(paths_.thumbnail(entry.scene));
     }
     remove_temporaries(files);
+    remove_all_temporaries(paths_.state + "/built");
     if (!options_.keep_built) remove_folder(paths_.state + "/built");
   }
 
@@ -246,7 +247,11 @@ class BatchRun {
     record.process_disk_read_bytes += end.disk_read_bytes;
     record.process_disk_written_bytes += end.disk_written_bytes;
     record.exit_code = end.signal != 0 ? 128 + end.signal : end.exit_code;
-    if (record.exit_code != 0) remove_temporaries(outputs_of(paths_, entry.scene));
+    if (record.exit_code != 0) {
+      remove_temporaries(outputs_of(paths_, entry.scene));
+      remove_all_temporaries(paths_.built(entry.scene));
+    }
+    if (!options_.keep_built) remove_folder(paths_.built(entry.scene));
     const bool stopped_by_us = told_ && (end.exit_code == kStoppedExit || end.signal == SIGTERM || end.signal == SIGINT);
     if (stopped_by_us) {
       record.message.clear();
@@ -257,7 +262,6 @@ class BatchRun {
       alone_.push_back(render.entry);
       return {};
     }
-    if (!options_.keep_built) remove_folder(paths_.built(entry.scene));
     return record.exit_code == 0 ? finished(entry) : failed_render(entry, end);
   }
 

@@ -41,6 +41,15 @@ void remove_temporaries(const std::vector<std::string>& files) {
   }
 }
 
+void remove_all_temporaries(const std::string& folder) {
+  std::error_code error;
+  std::vector<stdfs::path> found;
+  for (stdfs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (!final_name(at->path().filename().string()).empty()) found.push_back(at->path());
+  }
+  for (const stdfs::path& path : found) stdfs::remove(path, error);
+}
+
 void remove_folder(const std::string& folder) {
   std::error_code error;
   stdfs::remove_all(folder, error);

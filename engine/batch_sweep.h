@@ -10,6 +10,8 @@ namespace shoal {
 
 /// Removes the temporaries of these files. What cannot be removed stays.
 void remove_temporaries(const std::vector<std::string>& files);
+/// Removes every temporary in a folder of the batch's own and in the folders in it.
+void remove_all_temporaries(const std::string& folder);
 /// Removes a folder and all in it.
 void remove_folder(const std::string& folder);
 

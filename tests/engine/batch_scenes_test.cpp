@@ -318,6 +318,14 @@ TEST(BatchAsked, ComesBackAsItWasWritten) {
   EXPECT_FALSE(read_asked(posix_file_system(), folder.path()).ok());
 }
 
+TEST(BatchSweep, InItsOwnFoldersEveryTemporaryGoes) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a/.x.shoal.tmp-1-0", "a/x.shoal", "b/.y.tmp"}) put(folder / name);
+  remove_all_temporaries(folder.path());
+  EXPECT_THAT(folder.names("a"), ElementsAre("x.shoal"));
+  EXPECT_THAT(folder.names("b"), ElementsAre(".y.tmp"));
+}
+
 TEST(BatchSweep, OnlyTemporariesOfTheNamedFilesGo) {
   const TemporaryFolder folder;
   for (const char* name : {"a.exr", ".a.exr.tmp-12-0", ".a.exr.tmp-12-x", ".b.exr.tmp-12-0", ".a.exr.tmp-", "a.exr.tmp-1-2",
