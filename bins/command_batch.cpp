@@ -168,7 +168,6 @@ int run_command(const Arguments& arguments, Console& console) {
 
 void declare_batch(CLI::App& app, Console& console, Command& command, const std::vector<std::string>& behind_dashes) {
   auto arguments = std::make_shared<Arguments>();
-  arguments->rules = render_option_rules();
   arguments->behind_dashes = behind_dashes;
   CLI::App* sub = app.add_subcommand("batch", "every scene under a folder");
   sub->add_option("folder", arguments->folder, "where the scenes are: .gltf, .glb and .shoal in any folder below it");
@@ -196,7 +195,11 @@ void declare_batch(CLI::App& app, Console& console, Command& command, const std:
   sub->add_flag("--dry-run", arguments->dry_run, "print the commands that would run, one a line, for a shell; write nothing");
   sub->footer("Options behind -- are passed to every render, whatever its shoal.json says (docs/batch.md).\n"
               "Exit codes: 0 all done, 8 some failed (summary.json says which and why), 9 stopped.");
-  declare_passed_options(*sub, arguments->rules, arguments->common);
+  // Only when it is this command: those of all others need not wait for it, nor hold it in memory.
+  sub->preparse_callback([arguments, sub](size_t) {
+    arguments->rules = render_option_rules();
+    declare_passed_options(*sub, arguments->rules, arguments->common);
+  });
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_command(*arguments, console); };
   });
