@@ -143,7 +143,7 @@ class Exact {
   bool negative_ = false;
   int exponent_ = 0;  ///< of the lowest bit of limbs_[0]
   size_t size_ = 0;
-  std::array<uint64_t, kLimbs> limbs_;
+  std::array<uint64_t, kLimbs> limbs_{};
 };
 
 }  // namespace shoal::testing
