@@ -212,11 +212,12 @@ void declare_pose(CLI::App& app, PoseOptions& pose) {
   app.add_option("--animation", pose.animation, "its name or index (default: the first)")->type_name("NAME|INDEX");
   app.add_option_function<std::string>(
          "--shutter",
-         [](const std::string&) {
-           throw CLI::ValidationError("--shutter", "there is no motion blur yet: leave it out, or render several --time and "
-                                                   "take the mean of the pictures");
+         [&pose](const std::string& text) {
+           auto shutter = parse_shutter(text);
+           if (!shutter.ok()) throw CLI::ValidationError("--shutter", shutter.error().message);
+           pose.shutter = shutter.value();
          },
-         "refused: there is no motion blur yet")
+         "open from and to so many seconds after --time: nodes that move are blurred (default: an instant)")
       ->type_name("OPEN:CLOSE");
 }
 

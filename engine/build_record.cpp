@@ -46,6 +46,9 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
   hash.add(options.treelet_bytes);
   SHOAL_ASSIGN_OR_RETURN(const auto pose, choose_pose(document, options.pose));
   if (pose) hash.add(pose->animation), hash.add(std::bit_cast<uint64_t>(pose->time + 0.0));
+  if (pose && pose->has_shutter()) {
+    hash.add(std::bit_cast<uint64_t>(pose->open + 0.0)), hash.add(std::bit_cast<uint64_t>(pose->close + 0.0));
+  }
   hash.add(kSceneVersion);
   if (!options.variant.empty()) hash.add(XXH3_64bits(options.variant.data(), options.variant.size()));
   hash.add(XXH3_64bits(kBuilderVersion, std::char_traits<char>::length(kBuilderVersion)));
@@ -66,6 +69,7 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
     json["options"]["animation"] = pose->animation;
     json["options"]["animation_name"] = pose->name;
     json["options"]["time"] = pose->time;
+    if (pose->shutter) json["options"]["shutter"] = *pose->shutter;
   }
   json["triangles_count"] = header.triangles_count;
   json["instanced_triangles_count"] = header.instanced_triangles_count;

@@ -13,6 +13,7 @@
 #include "engine/consume_source.h"
 #include "engine/emitters.h"
 #include "engine/measure_images.h"
+#include "engine/motion_keys.h"
 #include "engine/place_instances.h"
 #include "engine/plan_objects.h"
 #include "engine/process_memory.h"
@@ -46,6 +47,10 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(read_document());
     SHOAL_RETURN_IF_ERROR(decompress_document());
     gltf::BufferFiles files(fs_, document_);
+    if (pose_ && pose_->has_shutter()) {
+      SHOAL_ASSIGN_OR_RETURN(motion_, find_motion(files, document_, *pose_, most_motion_rows(cap_bytes())));
+      note(motion_.warnings);
+    }
     SHOAL_RETURN_IF_ERROR(pose_document(files, document_, pose_, report_.warnings));
     SHOAL_RETURN_IF_ERROR(plan(files, true));
     note(flat_.warnings);
@@ -111,6 +116,7 @@ class SceneBuilder {
   Status plan(gltf::BufferFiles& files, bool readable) {
     SHOAL_ASSIGN_OR_RETURN(flat_, flatten_nodes(document_, options_.limits));
     if (readable) SHOAL_RETURN_IF_ERROR(place_instancings(files, document_, flat_));
+    for (PlacedItem& item : flat_.meshes) item.moves = motion_.meshes.contains(item.node);
     SHOAL_ASSIGN_OR_RETURN(geometry_, plan_geometry(readable ? &files : nullptr, document_, flat_));
     SHOAL_ASSIGN_OR_RETURN(materials_, plan_materials(document_, geometry_.uses));
     return plan_memory(files);
@@ -156,6 +162,7 @@ class SceneBuilder {
       needs.instances += shown;
       needs.emitters += emitters * (1 + 2 * shown);
     }
+    needs.instances += (motion_.meshes.size() + motion_.cameras.size()) * motion_.key_count;
     needs.treelet_bytes = options_.treelet_bytes;
     needs.threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
     needs.forced_chunk_triangles = options_.chunk_triangles;
@@ -233,8 +240,15 @@ class SceneBuilder {
     progress(stage, static_cast<double>(done->second) / static_cast<double>(total_triangles_));
   }
 
-  Status place(uint32_t object, const AffineDouble& to_world, const std::string& name) {
-    const auto placed = place_instance(object, built_[object].bounds, to_world);
+  Status place(uint32_t object, const PlacedItem& item, const std::string& name) {
+    std::optional<PlacedInstance> placed;
+    if (item.moves) {
+      placed = place_moving_instance(object, built_[object].bounds, motion_.meshes.at(item.node));
+      if (!placed) {
+        report_.warnings.push_back(fmt::format("an instance of {} is not blurred: it vanishes on its way", name));
+      }
+    }
+    if (!placed) placed = place_instance(object, built_[object].bounds, item.to_world);
     if (!placed) {
       report_.warnings.push_back(fmt::format("an instance of {} is left out: its matrix has no inverse", name));
       return {};
@@ -250,12 +264,12 @@ class SceneBuilder {
     for (uint32_t i = 0; i < built_.size(); ++i) {
       if (built_[i].nodes.empty()) continue;
       if (geometry_.objects[i].baked) {
-        SHOAL_RETURN_IF_ERROR(place(i, AffineDouble{}, "the world object"));
+        SHOAL_RETURN_IF_ERROR(place(i, PlacedItem{}, "the world object"));
         continue;
       }
       const uint32_t mesh = geometry_.objects[i].meshes[0];
       for (const uint32_t p : geometry_.meshes[mesh].placements) {
-        SHOAL_RETURN_IF_ERROR(place(i, flat_.meshes[p].to_world, fmt::format("meshes[{}]", mesh)));
+        SHOAL_RETURN_IF_ERROR(place(i, flat_.meshes[p], fmt::format("meshes[{}]", mesh)));
       }
     }
     if (placed_.empty()) {
@@ -306,12 +320,15 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kTextures, textures_.textures));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kEmitters, emitters_));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kLights, convert_lights(document_, flat_)));
-    SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kCameras, convert_cameras(document_, flat_)));
+    std::vector<CameraRecord> cameras = convert_cameras(document_, flat_);
+    const std::vector<Affine3> camera_keys = add_camera_keys(motion_, flat_, cameras);
+    SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kCameras, cameras));
     const std::string sources = sources_.table(output);
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kNames, std::as_bytes(std::span(names))));
     SHOAL_RETURN_IF_ERROR(writer.append_table(tables::kSourceFiles, std::as_bytes(std::span(sources))));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kMaterialLayers, materials_.layers));
     SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kTextureTransforms, materials_.transforms));
+    SHOAL_RETURN_IF_ERROR(append_rows(writer, tables::kCameraKeys, camera_keys));
     return append_rows(writer, tables::kBakedMeshes, baked_meshes());
   }
 
@@ -340,6 +357,7 @@ class SceneBuilder {
   std::vector<PlacedInstance> placed_;
   std::vector<Emitter> emitters_;
   std::optional<ChosenPose> pose_;
+  MotionKeys motion_;
   BuildMemoryPlan memory_;
   std::optional<SourceConsumer> consumer_;
   std::string scratch_folder_;

@@ -31,15 +31,22 @@ float lens_radius(const LensOptions& lens, float tan_half_yfov) {
   return 0.5f * lens.aperture;
 }
 
+Affine3 with_unit_axes(const Affine3& m) {
+  return {unit_or(m.column_x, {1, 0, 0}), unit_or(m.column_y, {0, 1, 0}), unit_or(m.column_z, {0, 0, 1}),
+          m.translation};
+}
+
 }  // namespace
 
-Camera::Camera(const CameraRecord& asked, uint32_t width, uint32_t height, const LensOptions& lens)
-    : projection_(projection_of(asked, lens)), distortion_(lens.distortion), width_(width), height_(height) {
+Camera::Camera(const CameraRecord& asked, uint32_t width, uint32_t height, const LensOptions& lens,
+               std::span<const Affine3> keys)
+    : projection_(projection_of(asked, lens)),
+      distortion_(lens.distortion),
+      width_(width),
+      height_(height),
+      keys_(keys) {
   const CameraRecord record = seen_through(asked, lens);
-  camera_to_world_ = record.camera_to_world;
-  camera_to_world_.column_x = unit_or(camera_to_world_.column_x, {1, 0, 0});
-  camera_to_world_.column_y = unit_or(camera_to_world_.column_y, {0, 1, 0});
-  camera_to_world_.column_z = unit_or(camera_to_world_.column_z, {0, 0, 1});
+  camera_to_world_ = with_unit_axes(record.camera_to_world);
   scale_y_ = projection_ == Projection::kOrthographic ? record.ymag : record.tan_half_yfov;
   scale_x_ = scale_y_ * (static_cast<float>(width) / static_cast<float>(height));
   lens_radius_ = lens_radius(lens, record.tan_half_yfov);
@@ -47,6 +54,26 @@ Camera::Camera(const CameraRecord& asked, uint32_t width, uint32_t height, const
   half_fov_ = (lens.fov_degrees > 0 ? lens.fov_degrees : 180.0f) * (kPi / 360);
   const bool flat = projection_ == Projection::kPerspective || projection_ == Projection::kOrthographic;
   plain_ = flat && lens_radius_ == 0 && distortion_.model == DistortionModel::kNone;
+}
+
+Camera Camera::at(float time) const {
+  constexpr float kCosOf45Degrees = 0.70710678f;
+  const float place = time * static_cast<float>(keys_.size() - 1);
+  const size_t key = std::min(static_cast<size_t>(place), keys_.size() - 2);
+  const float s = place - static_cast<float>(key);
+  Camera now = *this;
+  now.keys_ = {};
+  now.camera_to_world_ = with_unit_axes(keys_[key]);
+  const Affine3& from = now.camera_to_world_;
+  const Affine3 to = with_unit_axes(keys_[key + 1]);
+  const float turn = std::min({glm::dot(from.column_x, to.column_x), glm::dot(from.column_y, to.column_y),
+                               glm::dot(from.column_z, to.column_z)});
+  if (s == 0 || turn < kCosOf45Degrees) return now;
+  const auto between = [s](const Vec3& a, const Vec3& b) { return a * (1 - s) + b * s; };
+  now.camera_to_world_ =
+      with_unit_axes({between(from.column_x, to.column_x), between(from.column_y, to.column_y),
+                      between(from.column_z, to.column_z), between(from.translation, to.translation)});
+  return now;
 }
 
 CameraRay Camera::ray(uint32_t x, uint32_t y, const Random4& random, const Random4& lens) const {

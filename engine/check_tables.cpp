@@ -46,20 +46,10 @@ class TableChecker {
     }));
     SHOAL_RETURN_IF_ERROR(each("emitters", scene_.emitters, [&](size_t i) { return emitter(i); }));
     SHOAL_RETURN_IF_ERROR(each("lights", scene_.lights, [&](size_t i) { return light(scene_.lights[i]); }));
+    SHOAL_RETURN_IF_ERROR(each("camera keys", scene_.camera_keys, [&](size_t i) {
+      return finite(scene_.camera_keys[i]) ? nullptr : "finite numbers";
+    }));
     return each("cameras", scene_.cameras, [&](size_t i) { return camera(scene_.cameras[i]); });
-  }
-
- private:
-  /// A row's check returns what is expected, or nullptr.
-  template <class T, class Check>
-  Status each(const char* table, const std::vector<T>& rows, Check check) {
-    for (size_t i = 0; i < rows.size(); ++i) {
-      if (const char* expected = check(i)) {
-        return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}, row {} of {}: expected {}",
-                                                      scene_.file->path(), table, i, rows.size(), expected)};
-      }
-    }
-    return {};
   }
 
   Status header() {
@@ -73,6 +63,19 @@ class TableChecker {
     if (!finite(h.bounds_lo) || !finite(h.bounds_hi)) return corrupt("bounds: expected finite numbers");
     for (int i = 0; i < 3; ++i) {
       if (h.bounds_lo[i] > h.bounds_hi[i]) return corrupt("bounds: expected lo <= hi");
+    }
+    return {};
+  }
+
+ private:
+  /// A row's check returns what is expected, or nullptr.
+  template <class T, class Check>
+  Status each(const char* table, const std::vector<T>& rows, Check check) {
+    for (size_t i = 0; i < rows.size(); ++i) {
+      if (const char* expected = check(i)) {
+        return Error{ErrorCode::kCorrupt, fmt::format("{}: table of {}, row {} of {}: expected {}",
+                                                      scene_.file->path(), table, i, rows.size(), expected)};
+      }
     }
     return {};
   }
@@ -190,13 +193,18 @@ class TableChecker {
     if (c.perspective > 1) return "perspective to be 0 or 1";
     const bool numbers = finite(c.camera_to_world) && std::isfinite(c.tan_half_yfov) &&
                          std::isfinite(c.aspect_ratio) && std::isfinite(c.xmag) && std::isfinite(c.ymag);
-    return numbers ? nullptr : "finite numbers";
+    if (!numbers) return "finite numbers";
+    if (c.key_count == 0 && c.first_key == 0) return nullptr;
+    const bool there = c.key_count >= 2 && uint64_t{c.first_key} + c.key_count <= scene_.camera_keys.size();
+    return there ? nullptr : "two keys at least, in the camera keys";
   }
 
   const Scene& scene_;
 };
 
 }  // namespace
+
+Status check_header(const Scene& scene) { return TableChecker(scene).header(); }
 
 Status check_tables(const Scene& scene) { return TableChecker(scene).run(); }
 

@@ -6,6 +6,8 @@
 
 namespace shoal {
 
+/// The scene header alone, first of all: of another version, rows are of other lengths. Fails with: kCorrupt.
+Status check_header(const Scene& scene);
 /// Everything but the top tree (TopTree::check). Requires: scene.file open.
 /// Fails with: kCorrupt (names the table and the index).
 Status check_tables(const Scene& scene);

@@ -14,7 +14,7 @@ struct Effect {
   std::string_view name, extension;
   uint32_t bit;
 };
-constexpr std::array<Effect, 19> kForceable = {{
+constexpr std::array<Effect, 20> kForceable = {{
     {"reflection", "glTF 2.0", kEffectReflection},
     {"emission", "glTF 2.0", kEffectEmission},
     {"coverage", "glTF 2.0", kEffectCoverage},
@@ -23,6 +23,7 @@ constexpr std::array<Effect, 19> kForceable = {{
     {"punctual-lights", "KHR_lights_punctual", kEffectPunctualLights},
     {"environment", "", kEffectEnvironment},
     {"lens", "", kEffectLens},
+    {"motion", "glTF 2.0", kEffectMotion},
     {"normal-map", "glTF 2.0", kEffectNormalMap},
     {"texture-transform", "KHR_texture_transform", kEffectTextureTransform},
     {"unlit", "KHR_materials_unlit", kEffectUnlit},
@@ -111,6 +112,13 @@ EffectState called_by_instances(const Scene& scene) {
   return state;
 }
 
+/// What stands still is no caller, nor is anything where the shutter is not open.
+void count_moving(const Scene& scene, EffectState& state) {
+  state.caller = "node";
+  for (const Instance& instance : scene.top_tree.instances()) state.callers_count += instance.moves() ? 1 : 0;
+  for (const CameraRecord& camera : scene.cameras) state.callers_count += camera.key_count > 0 ? 1 : 0;
+}
+
 bool has_texture(const Scene& scene, const Material& m) {
   for (const TextureSlot* s : texture_slots(m)) {
     if (s->texture != kNoIndex) return true;
@@ -137,6 +145,7 @@ void count_callers(const Callers& callers, EffectState& state) {
     case kEffectPunctualLights: return count_lights(callers, state);
     case kEffectEnvironment: return count_option(callers.askers.environment, state);
     case kEffectLens: return count_option(callers.askers.lens, state);
+    case kEffectMotion: return count_moving(callers.scene, state);
     default:
       return count_materials(callers, state, [&](const Material& m) { return (m.effects & state.bit) != 0; });
   }
@@ -149,6 +158,10 @@ std::string reason(const EffectState& e) {
     const std::string_view who = e.bit == kEffectLens ? "--aperture or --distortion" : "--environment";
     why = e.callers_count > 0 ? fmt::format("{} asks for it", e.first_caller)
                               : fmt::format("no option asks for it: {} would", who);
+  } else if (e.bit == kEffectMotion) {
+    why = e.callers_count > 0 ? fmt::format("{} node{} while the shutter is open", e.callers_count,
+                                            e.callers_count == 1 ? " moves" : "s move")
+                              : "no node moves while the shutter is open (--shutter of the build)";
   } else if (e.callers_count == 0) {
     why = fmt::format("no {} calls for it", e.caller);
   } else {

@@ -25,8 +25,9 @@ enum SceneEffects : uint32_t {
   kEffectPunctualLights = 1u << 21,
   kEffectEnvironment = 1u << 22,
   kEffectLens = 1u << 23,            ///< aperture and distortion
+  kEffectMotion = 1u << 24,          ///< off: all stands as in the middle of the shutter
 };
-inline constexpr uint32_t kAllSceneEffects = 0xff0000;
+inline constexpr uint32_t kAllSceneEffects = 0x1ff0000;
 /// Those that a material's values are changed for.
 inline constexpr uint32_t kMaterialSceneEffects =
     kEffectReflection | kEffectEmission | kEffectCoverage | kEffectTextures;
@@ -53,7 +54,7 @@ struct EffectState {
   std::string_view name;         ///< as --effects has it
   std::string_view extension;    ///< of glTF, or "glTF 2.0"
   uint32_t bit = 0;              ///< of MaterialEffects or SceneEffects; 0: cannot be forced
-  std::string_view caller;       ///< what calls for it: "material", "light", "instance", "option"
+  std::string_view caller;       ///< what calls for it: "material", "light", "node", "instance", "option"
   uint64_t callers_count = 0;
   std::string first_caller{};    ///< the first of these by name; empty where they have none
   bool on = false;               ///< simulated

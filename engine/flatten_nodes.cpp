@@ -26,9 +26,9 @@ void place(FlatScene& scene, const gltf::Document& document, uint32_t index, con
   if (instancing != document.instancings.end()) {
     scene.meshes.insert(scene.meshes.end(), instancing->second.count, {*node.mesh, index, to_world});
   } else if (node.mesh) {
-    scene.meshes.push_back({*node.mesh, kNoIndex, to_world});
+    scene.meshes.push_back({*node.mesh, kNoIndex, to_world, index});
   }
-  if (node.camera) scene.cameras.push_back({*node.camera, kNoIndex, to_world});
+  if (node.camera) scene.cameras.push_back({*node.camera, kNoIndex, to_world, index});
   if (node.light) scene.lights.push_back({*node.light, kNoIndex, to_world});
 }
 

@@ -18,6 +18,8 @@ struct PlacedItem {
   uint32_t index = 0;  ///< of the mesh, camera or light
   uint32_t instancing_node = kNoIndex;  ///< EXT_mesh_gpu_instancing: to_world is the node's, until place_instancings()
   AffineDouble to_world;
+  uint32_t node = kNoIndex;  ///< of cameras, and of meshes without EXT_mesh_gpu_instancing
+  bool moves = false;        ///< while the shutter is open: an object of its own (engine/motion_keys)
 };
 
 struct FlatScene {

@@ -69,6 +69,7 @@ LightSampler::LightSampler(const Scene& scene, const LightSources& sources, cons
 }
 
 double LightSampler::weight_of(const Emitter& emitter) const {
+  if (moves(emitter.instance)) return 0;
   const double weight = emitter_area(emitter) * sampled_weight(sources_.materials[emitter.material]);
   return weight > 0 && std::isfinite(weight) ? weight : 0.0;
 }

@@ -48,6 +48,7 @@ struct LightSources {
   std::span<const Emitter> emitters;
   std::span<const PunctualLight> lights;
   std::span<const Material> materials;  ///< of the emitters
+  bool frozen = false;  ///< nothing moves, whatever the scene says
 };
 
 class LightSampler {
@@ -57,7 +58,7 @@ class LightSampler {
 
   /// Keeps references to what it is given. `threads` build the tree, if there are more placed lights than `few`.
   LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights)
-      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials}, environment, threads, few) {}
+      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials, false}, environment, threads, few) {}
   LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment, unsigned threads,
                uint64_t few);
 
@@ -70,6 +71,7 @@ class LightSampler {
   /// Density by area with which sample() finds a point on the emissive triangle that was hit, of this material; 0 when it
   /// never does.
   double emitter_pdf(const Material& material, const Hit& hit, const LightReceiver& receiver) const {
+    if (moves(hit.instance)) return 0;
     if (has_tree()) return tree_emitter_pdf(hit, receiver);
     return emitter_density_ * sampled_weight(material);
   }
@@ -86,9 +88,13 @@ class LightSampler {
 
  private:
   /// Emitters with coverage are found by chance only: a shadow ray ends before the emitter and so cannot ask whether
-  /// the emitter is there.
+  /// the emitter is there. So are those that move: their area and place would have to be those of the path's time.
   static double sampled_weight(const Material& material) {
     return material.coverage == CoverageMode::kOpaque ? material.emission_weight : 0.0f;
+  }
+  bool moves(uint32_t instance) const {
+    const TopTree& tree = scene_->top_tree;
+    return !sources_.frozen && instance < tree.instance_count() && tree.instance(instance).moves();
   }
   double weight_of(const Emitter& emitter) const;
   void weigh_choices();

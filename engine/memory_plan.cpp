@@ -219,7 +219,8 @@ Result<MemoryPlan> plan_before_tables(FileSystem& fs, const PageFile& file, cons
   }
   for (const TableId table : {tables::kBuildRecord, tables::kSceneHeader, tables::kTreelets, tables::kMaterials,
                               tables::kTextures, tables::kEmitters, tables::kLights, tables::kCameras, tables::kNames,
-                              tables::kSourceFiles, tables::kMaterialLayers, tables::kTextureTransforms}) {
+                              tables::kSourceFiles, tables::kMaterialLayers, tables::kTextureTransforms,
+                              tables::kCameraKeys}) {
     sizes.table_bytes += size_of(file, table);
   }
   const uint64_t emitters = size_of(file, tables::kEmitters) / sizeof(Emitter);

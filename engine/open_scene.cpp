@@ -71,6 +71,7 @@ Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions t
                  fmt::format("{}: table of scene headers: expected 1 row, found {}", file.path(), headers.size())};
   }
   scene.header = headers[0];
+  SHOAL_RETURN_IF_ERROR(check_header(scene));
   SHOAL_ASSIGN_OR_RETURN(scene.treelets, read_rows<TreeletPages>(file, tables::kTreelets, "treelets"));
   SHOAL_ASSIGN_OR_RETURN(scene.materials, read_rows<Material>(file, tables::kMaterials, "materials"));
   SHOAL_ASSIGN_OR_RETURN(scene.material_layers,
@@ -81,6 +82,7 @@ Result<Scene> read_scene(std::unique_ptr<PageFile> page_file, TraversalOptions t
   SHOAL_ASSIGN_OR_RETURN(scene.emitters, read_rows<Emitter>(file, tables::kEmitters, "emitters"));
   SHOAL_ASSIGN_OR_RETURN(scene.lights, read_rows<PunctualLight>(file, tables::kLights, "lights"));
   SHOAL_ASSIGN_OR_RETURN(scene.cameras, read_rows<CameraRecord>(file, tables::kCameras, "cameras"));
+  SHOAL_ASSIGN_OR_RETURN(scene.camera_keys, read_rows<Affine3>(file, tables::kCameraKeys, "camera keys"));
   SHOAL_ASSIGN_OR_RETURN(scene.build_record, read_text(file, tables::kBuildRecord));
   SHOAL_ASSIGN_OR_RETURN(scene.names, read_text(file, tables::kNames));
   if (file.has_table(tables::kSourceFiles)) {
@@ -95,7 +97,7 @@ uint64_t Scene::resident_bytes() const {
   const auto bytes = [](const auto& rows) { return uint64_t{rows.capacity()} * sizeof(rows[0]); };
   return top_tree.resident_bytes() + bytes(treelets) + bytes(materials) + bytes(material_layers) +
          bytes(texture_transforms) + bytes(textures) + bytes(emitters) +
-         bytes(lights) + bytes(cameras) + bytes(entries_by_treelet) + bytes(build_record) + bytes(names) +
+         bytes(lights) + bytes(cameras) + bytes(camera_keys) + bytes(entries_by_treelet) + bytes(build_record) + bytes(names) +
          bytes(source_files) +
          file->records().size_bytes();
 }

@@ -5,6 +5,7 @@
 #include "engine/counters.h"
 #include "engine/path_state.h"
 #include "engine/sampler.h"
+#include "engine/shutter_times.h"
 #include "treelets/ray.h"
 
 namespace shoal {
@@ -19,23 +20,35 @@ inline RayKind kind_of(const Ray& ray) {
   return counted_bounce_of(ray) == 0 ? RayKind::kCamera : RayKind::kBounce;
 }
 
-/// What a ray's coverage is decided by. Never Ray::kNoCoverage.
+/// What a ray's coverage is decided by. Ray::has_coverage() is true of it.
 inline uint32_t coverage_seed(const PathState& path, uint64_t seed, bool any_hit) {
   const uint32_t bits = random4(seed, path.pixel, path.sample, path.bounce, Dimension::kCoverage).bits[any_hit ? 1 : 0];
-  return bits == Ray::kNoCoverage ? 0 : bits;
+  return (bits & 0xffffu) == Ray::kNoCoverage ? bits ^ 1 : bits;
 }
 
-/// A ray of `path`, not yet addressed. `bounce` is the vertex that it leaves from (shadow) or goes to. Without
-/// `coverage` every triangle is there.
-inline Ray make_ray(uint32_t path_index, const PathState& path, uint64_t seed, const Vec3& origin,
-                    const Vec3& direction, float t_max, bool any_hit, bool coverage) {
+/// What the rays of a picture carry beside their way: without `coverage` every triangle is there.
+struct RaySeeds {
+  uint64_t seed = 0;
+  bool coverage = true;
+  ShutterTimes times = ShutterTimes::kNone;
+
+  uint32_t of(const PathState& path, bool any_hit) const {
+    const uint32_t bits = coverage ? coverage_seed(path, seed, any_hit) : Ray::kNoCoverage;
+    if (times == ShutterTimes::kNone) return bits;
+    return (time_bits(path, seed, times) & 0xffff0000u) | (bits & 0xffffu);
+  }
+};
+
+/// A ray of `path`, not yet addressed; `path.bounce` is the vertex that it leaves from (shadow) or goes to.
+inline Ray make_ray(uint32_t path_index, const PathState& path, const RaySeeds& seeds, const Vec3& origin,
+                    const Vec3& direction, float t_max, bool any_hit) {
   Ray ray;
   ray.origin = origin;
   ray.direction = direction;
   ray.t = t_max;
   const uint32_t counted = path.bounce < kCountedBounces ? path.bounce : kCountedBounces - 1;
   ray.path = path_index | (counted << kPathIndexBits) | (any_hit ? Ray::kAnyHitBit : 0u);
-  ray.alpha_seed = coverage ? coverage_seed(path, seed, any_hit) : Ray::kNoCoverage;
+  ray.alpha_seed = seeds.of(path, any_hit);
   return ray;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/affine_double.h"
@@ -14,6 +15,7 @@ namespace shoal {
 
 struct PlacedInstance {
   Instance instance;  ///< root_node and tree_child are set by assemble_top_tree()
+  std::vector<Instance> keys;  ///< where it stands at even times; empty: it does not move
   Bounds3 bounds;     ///< world space, encloses every point of the object as any rounding of the map shows it
 };
 
@@ -21,6 +23,10 @@ struct PlacedInstance {
 /// rounded map). Nothing when the map has no inverse in float: the instance would be flat.
 std::optional<PlacedInstance> place_instance(uint32_t object, const Bounds3& object_bounds,
                                              const AffineDouble& to_world);
+
+/// The same for an instance that moves: `keys` at even times, at least two. Nothing where one of them has no inverse.
+std::optional<PlacedInstance> place_moving_instance(uint32_t object, const Bounds3& object_bounds,
+                                                    std::span<const AffineDouble> keys);
 
 struct TopTables {
   std::vector<TopNode> nodes;

@@ -35,7 +35,7 @@ void group_objects(GeometryPlan& plan) {
   for (uint32_t m = 0; m < plan.meshes.size(); ++m) {
     const MeshPlan& mesh = plan.meshes[m];
     if (mesh.primitives.empty()) continue;
-    if (mesh.placements.size() == 1) {
+    if (mesh.placements.size() == 1 && !mesh.moves) {
       world.meshes.push_back(m);
     } else {
       shared.push_back({{m}, false});
@@ -52,7 +52,11 @@ Result<GeometryPlan> plan_geometry(gltf::BufferFiles* files, const gltf::Documen
   GeometryPlan plan;
   plan.meshes.resize(document.meshes.size());
   plan.uses.resize(document.materials.size() + 1);
-  for (uint32_t i = 0; i < scene.meshes.size(); ++i) plan.meshes[scene.meshes[i].index].placements.push_back(i);
+  for (uint32_t i = 0; i < scene.meshes.size(); ++i) {
+    MeshPlan& mesh = plan.meshes[scene.meshes[i].index];
+    mesh.placements.push_back(i);
+    mesh.moves = mesh.moves || scene.meshes[i].moves;
+  }
   uint64_t triangles = 0, others = 0;
   for (uint32_t m = 0; m < document.meshes.size(); ++m) {
     if (plan.meshes[m].placements.empty()) continue;

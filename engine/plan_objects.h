@@ -1,5 +1,5 @@
-// Which triangles become which object, before any of them is read. A mesh that one node shows is baked into the
-// world object (object 0, instance 0, identity); a mesh that several nodes show is an object of its own, stored
+// Which triangles become which object, before any of them is read. A mesh that one node shows, and that stands still,
+// is baked into the world object (object 0, instance 0, identity); any other mesh is an object of its own, stored
 // once and instanced, however small it is: treelets hold small objects well, and a rule without sizes is easy to
 // predict. Called by engine/build_scene. Cost: nothing is read but accessor counts.
 #pragma once
@@ -15,6 +15,7 @@ namespace shoal {
 struct MeshPlan {
   std::vector<PrimitiveSource> primitives;
   std::vector<uint32_t> placements;
+  bool moves = false;  ///< one of them does: not baked
 };
 
 struct ObjectPlan {

@@ -34,28 +34,6 @@ class Poser {
   Poser(gltf::BufferFiles& files, gltf::Document& document, std::vector<std::string>& warnings)
       : files_(files), document_(document), warnings_(warnings) {}
 
-  Status animate(const ChosenPose& pose) {
-    AnimationSampler sampler(files_, document_, pose.animation, pose.time);
-    std::map<uint32_t, gltf::RestPlace> places;
-    for (const gltf::AnimationChannel& channel : document_.animations[pose.animation].channels) {
-      const bool weights = channel.path == AnimatedPath::kWeights;
-      if (weights && !document_.nodes[channel.node].mesh) continue;  // weights of nothing
-      SHOAL_ASSIGN_OR_RETURN(const std::vector<double> v, sampler.sample(channel));
-      if (weights) {
-        document_.node_weights[channel.node] = v;
-        continue;
-      }
-      gltf::RestPlace& place = places.try_emplace(channel.node, document_.rest_places.at(channel.node)).first->second;
-      if (channel.path == AnimatedPath::kTranslation) place.translation = {v[0], v[1], v[2]};
-      if (channel.path == AnimatedPath::kRotation) place.rotation = {v[0], v[1], v[2], v[3]};
-      if (channel.path == AnimatedPath::kScale) place.scale = {v[0], v[1], v[2]};
-    }
-    for (const auto& [node, place] : places) {
-      document_.nodes[node].matrix = gltf::compose_matrix(place.translation, place.rotation, place.scale);
-    }
-    return {};
-  }
-
   /// Gives every mesh that is shown its weights and joints.
   Status pose_meshes() {
     SHOAL_RETURN_IF_ERROR(pose_skins());
@@ -214,6 +192,13 @@ Result<std::optional<ChosenPose>> choose_pose(const gltf::Document& document, co
   if (animations.empty()) return wrong("a time or an animation was asked for, the scene has no animation");
   ChosenPose pose;
   pose.time = options.time.value_or(0);
+  pose.open = pose.close = pose.time;
+  pose.shutter = options.shutter;
+  if (options.shutter) {
+    pose.open += (*options.shutter)[0], pose.close += (*options.shutter)[1];
+    const bool lasts = std::isfinite(pose.open) && std::isfinite(pose.close) && pose.close > pose.open;
+    if (!lasts) return wrong("a shutter must open before it closes, both at finite times");
+  }
   if (!options.animation.empty()) {
     const auto named = std::find_if(animations.begin(), animations.end(),
                                     [&](const gltf::Animation& a) { return a.name == options.animation; });
@@ -245,12 +230,45 @@ uint64_t pose_bytes(const gltf::Document& document) {
   return bytes;
 }
 
+Status animate(gltf::BufferFiles& files, gltf::Document& document, uint32_t animation, double time) {
+  AnimationSampler sampler(files, document, animation, time);
+  std::map<uint32_t, gltf::RestPlace> places;
+  for (const gltf::AnimationChannel& channel : document.animations[animation].channels) {
+    const bool weights = channel.path == AnimatedPath::kWeights;
+    if (weights && !document.nodes[channel.node].mesh) continue;  // weights of nothing
+    SHOAL_ASSIGN_OR_RETURN(const std::vector<double> v, sampler.sample(channel));
+    if (weights) {
+      document.node_weights[channel.node] = v;
+      continue;
+    }
+    gltf::RestPlace& place = places.try_emplace(channel.node, document.rest_places.at(channel.node)).first->second;
+    if (channel.path == AnimatedPath::kTranslation) place.translation = {v[0], v[1], v[2]};
+    if (channel.path == AnimatedPath::kRotation) place.rotation = {v[0], v[1], v[2], v[3]};
+    if (channel.path == AnimatedPath::kScale) place.scale = {v[0], v[1], v[2]};
+  }
+  for (const auto& [node, place] : places) {
+    document.nodes[node].matrix = gltf::compose_matrix(place.translation, place.rotation, place.scale);
+  }
+  return {};
+}
+
 Status pose_document(gltf::BufferFiles& files, gltf::Document& document, const std::optional<ChosenPose>& pose,
                      std::vector<std::string>& warnings) {
-  Poser poser(files, document, warnings);
-  if (pose) SHOAL_RETURN_IF_ERROR(poser.animate(*pose));
+  if (pose) SHOAL_RETURN_IF_ERROR(animate(files, document, pose->animation, pose->middle()));
   if (document.skins.empty() && !has_targets(document)) return {};
-  return poser.pose_meshes();
+  return Poser(files, document, warnings).pose_meshes();
+}
+
+Result<std::array<double, 2>> parse_shutter(const std::string& text) {
+  std::array<double, 2> out{};
+  const char* const end = text.data() + text.size();
+  const auto [middle, code] = std::from_chars(text.data(), end, out[0]);
+  if (code == std::errc() && middle != end && *middle == ':') {
+    const auto [rest, code2] = std::from_chars(middle + 1, end, out[1]);
+    if (code2 == std::errc() && rest == end && out[0] < out[1]) return out;
+  }
+  return Error{ErrorCode::kUsage,
+               fmt::format("'{}' is no shutter: expected OPEN:CLOSE in seconds after --time, such as 0:0.02", text)};
 }
 
 Status check_pose(const Scene& scene, const PoseOptions& options) {
@@ -266,13 +284,17 @@ Status check_pose(const Scene& scene, const PoseOptions& options) {
     const std::string name = named ? built["animation_name"].get<std::string>() : std::string();
     const bool animation = options.animation.empty() ? index == 0
                                                      : options.animation == name || index_of(options.animation) == index;
-    if (animation && built["time"].get<double>() == options.time.value_or(0)) return {};
-    found = fmt::format("at {} s of animation {}{}", built["time"].get<double>(), index,
-                        name.empty() ? "" : " (" + gltf::printable(name) + ")");
+    const nlohmann::json shutter = options.shutter ? nlohmann::json(*options.shutter) : nlohmann::json();
+    const nlohmann::json built_shutter = built.value("shutter", nlohmann::json());
+    const bool same_time = built["time"].get<double>() == options.time.value_or(0) && built_shutter == shutter;
+    if (animation && same_time) return {};
+    found = fmt::format("at {} s of animation {}{}{}", built["time"].get<double>(), index,
+                        name.empty() ? "" : " (" + gltf::printable(name) + ")",
+                        built_shutter.is_null() ? "" : ", with a shutter of " + built_shutter.dump());
   }
   return Error{ErrorCode::kUsage,
-               fmt::format("{} was built {}: build it again with the --time and --animation that are asked for, or render "
-                           "the glTF itself", scene.file->path(), found)};
+               fmt::format("{} was built {}: build it again with the --time, --animation and --shutter that are asked "
+                           "for, or render the glTF itself", scene.file->path(), found)};
 }
 
 }  // namespace shoal

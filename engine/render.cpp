@@ -16,6 +16,12 @@ CameraRecord camera_record(const Scene& scene, const PictureOptions& picture) {
   return scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
 }
 
+/// Where the camera stands at even times of the shutter; none where it stands still.
+std::span<const Affine3> camera_keys(const Scene& scene, const CameraRecord& camera, const EffectChoice& effects) {
+  if ((effects.off & kEffectMotion) != 0) return {};
+  return std::span(scene.camera_keys).subspan(camera.first_key, camera.key_count);
+}
+
 Status check_options(const Scene& scene, const PictureOptions& picture, const ExecutionOptions& execution) {
   SHOAL_RETURN_IF_ERROR(check_picture(picture));
   const size_t cameras = std::max<size_t>(scene.cameras.size(), 1);
@@ -134,7 +140,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
 
   const CameraRecord seen_by = camera_record(scene, picture);
   const bool lens = (picture.shading.effects.off & kEffectLens) == 0;
-  const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens));
+  const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens),
+                      camera_keys(scene, seen_by, picture.shading.effects));
   const bool previewed = !execution.preview.path.empty();
   PassPlan passes(picture.samples, execution.time_limit_seconds);
   SampleOrder samples(picture.width, picture.height, passes.next(now_seconds() - start), picture.tile_sample,

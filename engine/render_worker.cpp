@@ -89,7 +89,8 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
       phases_(context.phases[thread]),
       shader_(context.scene, context.tables, context.picture.shading, context.cache),
       camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
-      coverage_(context.tables.has_coverage()),
+      seeds_{context.picture.shading.seed, context.tables.has_coverage(),
+             shutter_times(context.scene.top_tree, context.picture.shading.effects)},
       aovs_(context.aovs) {
   if (aovs_ == nullptr) return;
   seeks_ = aovs_->set().of_surface();
@@ -114,7 +115,11 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   const Random4 in_pixel = random4(seed, path.pixel, path.sample, 0, Dimension::kPixel);
   const Random4 on_lens =
       context_.camera.has_aperture() ? random4(seed, path.pixel, path.sample, 0, Dimension::kLens) : Random4{};
-  const CameraRay camera_ray = context_.camera.ray(sample.x, sample.y, in_pixel, on_lens);
+  const Camera& camera = context_.camera;
+  const CameraRay camera_ray =
+      camera.moves()
+          ? camera.at(time_of(path, seed, ShutterTimes::kSpread)).ray(sample.x, sample.y, in_pixel, on_lens)
+          : camera.ray(sample.x, sample.y, in_pixel, on_lens);
   path.origin = camera_ray.origin;
   path.direction = camera_ray.direction;
   path.cone = camera_cone_;
@@ -124,7 +129,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   counters_.path_state_moved_bytes += sizeof(PathState);
   if (!camera_ray.seen) path.throughput = Vec3(0);
   const float t_max = camera_ray.seen ? kRayInfinity : kRayNowhere;
-  const Ray ray = make_ray(path_index, path, seed, path.origin, path.direction, t_max, false, coverage_);
+  const Ray ray = make_ray(path_index, path, seeds_, path.origin, path.direction, t_max, false);
   ++ray_counters(ray).rays_traced_count;
   return ray;
 }
@@ -172,8 +177,8 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
   if (result.has_shadow) {
     const uint32_t bounce_after = path.bounce;
     path.bounce = bounce_before;  // the shadow ray belongs to the vertex that it leaves
-    rays[count++] = make_ray(path_index, path, seed, result.shadow_origin, result.shadow_direction,
-                             result.shadow_t_max, true, coverage_);
+    rays[count++] = make_ray(path_index, path, seeds_, result.shadow_origin, result.shadow_direction,
+                             result.shadow_t_max, true);
     path.bounce = bounce_after;
   }
   if (path.seeks != 0) note_features(path, bounce_before, result.has_bounce);
@@ -184,8 +189,7 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     path.origin = result.bounce_origin;
     path.direction = result.bounce_direction;
     path.hit = Hit{};
-    rays[count++] =
-        make_ray(path_index, path, seed, path.origin, path.direction, kRayInfinity, false, coverage_);
+    rays[count++] = make_ray(path_index, path, seeds_, path.origin, path.direction, kRayInfinity, false);
   }
   for (uint32_t i = 0; i < count; ++i) ++ray_counters(rays[i]).rays_traced_count;
   path.pending.store(count, std::memory_order_relaxed);

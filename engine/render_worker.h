@@ -177,7 +177,7 @@ class RenderWorker {
   PhaseClock& phases_;
   Shader shader_;
   uint32_t camera_cone_;  ///< PathState::cone of a path that begins
-  const bool coverage_;  ///< some material is there in part
+  const RaySeeds seeds_;
   PagePin geometry_, attributes_;
   TreeletId in_hand_ = kNoIndex;
   TreeletId attributes_of_ = kNoIndex;

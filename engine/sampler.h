@@ -18,7 +18,8 @@ enum class Dimension : uint32_t {
   kRoulette = 4,
   kCoverage = 5,
   kWavelength = 6,
-  kTexture = 7
+  kTexture = 7,
+  kTime = 8
 };
 
 struct Random4 {
@@ -38,6 +39,14 @@ inline Random4 random4(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t 
   x ^= x >> 16, y ^= y >> 16, z ^= z >> 16, w ^= w >> 16;
   x += y * w, y += z * x, z += x * y, w += y * z;
   return {{x, y, z, w}};
+}
+
+inline constexpr uint32_t reversed_bits(uint32_t x) {
+  x = (x >> 16) | (x << 16);
+  x = ((x & 0xff00ff00u) >> 8) | ((x & 0x00ff00ffu) << 8);
+  x = ((x & 0xf0f0f0f0u) >> 4) | ((x & 0x0f0f0f0fu) << 4);
+  x = ((x & 0xccccccccu) >> 2) | ((x & 0x33333333u) << 2);
+  return ((x & 0xaaaaaaaau) >> 1) | ((x & 0x55555555u) << 1);
 }
 
 }  // namespace shoal

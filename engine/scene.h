@@ -24,6 +24,7 @@ struct Scene {
   std::vector<Emitter> emitters;
   std::vector<PunctualLight> lights;
   std::vector<CameraRecord> cameras;
+  std::vector<Affine3> camera_keys;
   std::vector<uint32_t> entries_by_treelet;  ///< indices of top_tree.entries(), in order of their treelet
   std::string build_record;                  ///< JSON
   std::string names;                         ///< JSON: {"materials": [...], "cameras": [...], "lights": [...]}

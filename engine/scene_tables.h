@@ -29,11 +29,12 @@ inline constexpr TableId kNames = 12;        ///< JSON: names of materials, came
 inline constexpr TableId kSourceFiles = 13;  ///< engine/source_files.h; absent from files of earlier versions
 inline constexpr TableId kMaterialLayers = 14;     ///< MaterialLayers[]
 inline constexpr TableId kTextureTransforms = 15;  ///< TextureTransform[]
+inline constexpr TableId kCameraKeys = 16;         ///< Affine3[]: where cameras that move stand
 inline constexpr TableId kBakedMeshes = 20;        ///< words: first primitive of each (engine/object_ids.h); may be absent
 }  // namespace tables
 
 struct SceneHeader {
-  uint32_t version = 4;
+  uint32_t version = 5;
   uint32_t treelet_bytes = 0;        ///< --treelet-size of the build
   uint64_t triangles_count = 0;      ///< stored, an instanced mesh once
   uint64_t instanced_triangles_count = 0;
@@ -191,6 +192,7 @@ struct CameraRecord {
   float tan_half_yfov;
   float aspect_ratio;        ///< 0: from the picture
   float xmag, ymag;
+  uint32_t first_key, key_count;  ///< of the camera keys, if it moves: camera_to_world at even times; else 0
 };
 
 }  // namespace shoal

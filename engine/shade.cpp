@@ -11,6 +11,7 @@
 #include "engine/sampler.h"
 #include "engine/shading_tables.h"
 #include "engine/surface.h"
+#include "treelets/moving_instance.h"
 
 namespace shoal {
 namespace {
@@ -71,6 +72,7 @@ Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOpt
       tables_(&tables),
       options_(&options),
       materials_(tables.impl().materials.materials()),
+      times_(shutter_times(scene.top_tree, options.effects)),
       textures_(scene.textures, cache),
       follows_cones_(!kOnlyLambert && wants_cones(scene, options)) {}
 
@@ -80,8 +82,12 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   result = {};
   path.shadow_radiance = Vec3(0);
   ++counters.vertices_shaded_count;
-  const Surface surface = find_surface(path, scene_->top_tree.instance(path.hit.instance), geometry, attributes,
-                                       options_->triangle_test);
+  const Instance& instance = scene_->top_tree.instance(path.hit.instance);
+  const TriangleTest test = options_->triangle_test;
+  const Surface surface =
+      instance.moves() ? find_surface(path, instance_at(instance, time_of(path, options_->seed, times_)), geometry,
+                                      attributes, test)
+                       : find_surface(path, instance, geometry, attributes, test);
   const Material& material = materials_[surface.attributes.material];
   const uint32_t effects = kOnlyLambert ? 0 : options_->effects.of(material.effects);
   if (!kOnlyLambert && ((path.medium & kPathMediumMask) | (effects & kEffectVolume)) != 0) {

@@ -11,6 +11,7 @@
 #include "engine/effects.h"
 #include "engine/path_state.h"
 #include "engine/scene.h"
+#include "engine/shutter_times.h"
 #include "engine/surface_features.h"
 #include "engine/texture_footprint.h"
 #include "engine/texture_sample.h"
@@ -138,6 +139,7 @@ class Shader {
   const ShadingTables* tables_;
   const ShadingOptions* options_;
   std::span<const Material> materials_;
+  ShutterTimes times_;
   TextureSampler textures_;
   bool follows_cones_;
   SurfaceFeatures features_;

@@ -39,11 +39,28 @@ Status check_instance(const Tables& tables, uint32_t index) {
   if (tables.nodes[instance.root_node].parent != kNoIndex) {
     return corrupt(fmt::format("instance {}: node {} is not a root", index, instance.root_node));
   }
-  if (!is_finite(instance.object_to_world) || !is_finite(instance.world_to_object) || instance.identity > 1 ||
-      !std::isfinite(instance.transform_error) || !std::isfinite(instance.max_abs_coordinate)) {
-    return corrupt(fmt::format("instance {} has numbers that are not finite or flags that are not 0 or 1", index));
-  }
   return {};
+}
+
+Status check_finite(const Instance& row, uint32_t index) {
+  if (is_finite(row.object_to_world) && is_finite(row.world_to_object) && row.identity <= 1 &&
+      std::isfinite(row.transform_error) && std::isfinite(row.max_abs_coordinate)) {
+    return {};
+  }
+  return corrupt(fmt::format("instance {} has numbers that are not finite or flags that are not 0 or 1", index));
+}
+
+/// The keys of an instance lie behind all instances.
+Status check_motion(const Tables& tables, uint32_t index, size_t count) {
+  const Instance& instance = tables.instances[index];
+  if (instance.motion_rows == 0 && instance.key_count == 0) return {};
+  const uint64_t first = uint64_t{index} + instance.motion_rows;
+  if (first >= count && instance.key_count >= 2 && instance.identity == 0 &&
+      first + instance.key_count <= tables.instances.size()) {
+    return {};
+  }
+  return corrupt(fmt::format("instance {} has {} keys from row {}: expected 2 at least in rows {} to {}", index,
+                             instance.key_count, first, count, tables.instances.size()));
 }
 
 /// One child's link, box and kind. `wanted` is the kind of leaf that this tree may have.
@@ -94,7 +111,16 @@ Status check_tree(const Tables& tables, uint32_t root, ChildKind wanted) {
 }  // namespace
 
 Status TopTree::check(std::span<const TopNode> nodes, std::span<const TreeletEntry> entries,
-                      std::span<const Instance> instances, uint32_t treelet_count) {
+                      std::span<const Instance> rows, uint32_t treelet_count) {
+  size_t count = 0;
+  while (count < rows.size() && rows[count].tree_child != kNoIndex) ++count;
+  const std::span<const Instance> instances = rows.first(count);
+  for (uint32_t i = 0; i < rows.size(); ++i) SHOAL_RETURN_IF_ERROR(check_finite(rows[i], i));
+  for (uint32_t i = static_cast<uint32_t>(count); i < rows.size(); ++i) {
+    const bool key = rows[i].tree_child == kNoIndex && !rows[i].moves() && rows[i].key_count <= 1;
+    if (!key) return corrupt(fmt::format("row {} of the instances, behind the first key, is no key", i));
+  }
+  for (uint32_t i = 0; i < count; ++i) SHOAL_RETURN_IF_ERROR(check_motion({nodes, entries, rows}, i, count));
   const Tables tables{nodes, entries, instances};
   if (nodes.size() >= 1u << 29 || entries.size() >= kNoIndex || instances.size() >= kNoIndex) {
     return corrupt(fmt::format("{} nodes, {} entries and {} instances are too many", nodes.size(), entries.size(),

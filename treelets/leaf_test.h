@@ -21,7 +21,7 @@ inline bool comes_before(const Ray& ray, float t, uint32_t instance, uint32_t pr
 inline bool passes_coverage(const TreeletView& treelet, const Ray& ray, const TriangleHit& hit, uint32_t ordinal,
                             uint32_t primitive, TraceCounters& counters) {
   const uint32_t record = treelet.coverage_of()[ordinal];
-  if (record == kNoIndex || ray.alpha_seed == Ray::kNoCoverage) return true;
+  if (record == kNoIndex || !ray.has_coverage()) return true;
   ++counters.coverage_tests_count;
   return is_covered(treelet.coverage_records()[record], treelet.coverage_texels(), hit, ray.alpha_seed,
                     ray.instance, primitive);

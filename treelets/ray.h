@@ -38,11 +38,15 @@ struct alignas(64) Ray {
   uint32_t cursor = kNoIndex;    // 48  (top node << 3 | slot) of the child taken last; kNoIndex before the start
   uint32_t instance = kNoIndex;  // 52  the instance in whose tree the cursor is
   uint32_t more = 0;             // 56  a bit a level of the top tree: children left to enter
-  uint32_t alpha_seed = 0;       // 60  hash of (pixel, sample, bounce, kind), for stochastic coverage
+  uint32_t alpha_seed = 0;       // 60  hash of (pixel, sample, bounce, kind), for stochastic coverage; see time()
 
   static constexpr uint32_t kAnyHitBit = 0x80000000u;
-  static constexpr uint32_t kNoCoverage = 0xffffffffu;  ///< alpha_seed: every triangle is there, whatever its alpha
+  static constexpr uint32_t kNoCoverage = 0xffffu;  ///< lower half of alpha_seed: every triangle is there
   bool any_hit() const { return (path & kAnyHitBit) != 0; }
+  bool has_coverage() const { return (alpha_seed & 0xffffu) != kNoCoverage; }
+  /// Of scenes that move: the time of the ray, in [0, 1) of the shutter, is in the upper half of its seed.
+  float time() const { return shutter_time(alpha_seed); }
+  static float shutter_time(uint32_t bits) { return static_cast<float>(bits >> 16) * 0x1p-16f; }
 };
 static_assert(sizeof(Ray) == 64 && alignof(Ray) == 64);
 

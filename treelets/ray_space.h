@@ -123,14 +123,24 @@ inline float object_pad(const RaySpace& ray, float max_abs_coordinate) {
   return kObjectPad * (max_abs(ray.origin) + max_abs_coordinate) + std::numeric_limits<float>::min();
 }
 
-/// The ray in the space of `instance`: t is preserved, the direction is not normalised.
-inline RaySpace to_object_space(const Ray& ray, const Instance& instance) {
+/// The ray in the space of an instance that stands still.
+inline RaySpace to_still_space(const Ray& ray, const Instance& instance) {
   RaySpace object = instance.identity ? prepare_ray(ray.origin, ray.direction)
                                       : prepare_ray(instance.world_to_object.point(ray.origin),
                                                     instance.world_to_object.vector(ray.direction));
   set_pad(object, object_pad(object, instance.max_abs_coordinate),
           max_abs(object.origin) + instance.max_abs_coordinate);
   return object;
+}
+
+/// The ray in the space of an instance that moves. Not inline: what stands still pays a branch only.
+RaySpace to_moving_space(const Ray& ray, const Instance& instance);
+
+/// The ray in the space of `instance`, where it stands at the ray's time: t is preserved, the direction is not
+/// normalised.
+inline RaySpace to_object_space(const Ray& ray, const Instance& instance) {
+  if (instance.moves()) [[unlikely]] return to_moving_space(ray, instance);
+  return to_still_space(ray, instance);
 }
 
 /// What a worker keeps of the ray in hand between calls, so that one ray's transforms and reciprocals are computed

@@ -307,6 +307,9 @@ TopTree::TopTree(std::vector<TopNode> nodes, std::vector<TreeletEntry> entries, 
     world_extent_ = std::max(world_extent_, max_abs(&m.translation.x) + row_sum(m) * instance.max_abs_coordinate);
   }
   world_pad_scale_ = kWorldPad * largest_error;
+  const auto is_key = [](const Instance& row) { return row.tree_child == kNoIndex; };
+  const auto first_key = std::find_if(instances_.begin(), instances_.end(), is_key);
+  instance_count_ = static_cast<uint32_t>(first_key - instances_.begin());
   single_identity_ = instances_.size() == 1 && instances_[0].identity != 0;
 }
 

@@ -44,6 +44,8 @@ struct TreeletEntry {
 };
 static_assert(sizeof(TreeletEntry) == 8);
 
+/// The table holds the instances, then the keys of those that move (treelets/moving_instance.h): a key says where its
+/// instance stands at one time, and no node leads to it (tree_child: kNoIndex).
 struct Instance {  // 128 bytes, as stored
   Affine3 object_to_world;
   Affine3 world_to_object;  ///< computed in double, rounded once
@@ -53,7 +55,10 @@ struct Instance {  // 128 bytes, as stored
   uint32_t object;
   float transform_error;     ///< K of docs/design.md "Numerics": max row sum of |M| |M^-1|, 1 for identity
   float max_abs_coordinate;  ///< of the object's bounds, object space
-  uint32_t reserved[2];
+  uint32_t motion_rows;      ///< it moves: rows of the table from here to its first key; 0: it stands still
+  uint32_t key_count;        ///< of an instance that moves: 2 at least; else 0
+
+  bool moves() const { return motion_rows != 0; }
 };
 static_assert(sizeof(Instance) == 128);
 
@@ -98,10 +103,11 @@ class TopTree {
     return entries_[nodes_[ray.cursor >> 3].child[ray.cursor & 7]];
   }
   const Instance& instance(uint32_t index) const { return instances_[index]; }
-  uint32_t instance_count() const { return static_cast<uint32_t>(instances_.size()); }
+  uint32_t instance_count() const { return instance_count_; }
+  bool moves() const { return instance_count_ < instances_.size(); }
   std::span<const TopNode> nodes() const { return nodes_; }
   std::span<const TreeletEntry> entries() const { return entries_; }
-  std::span<const Instance> instances() const { return instances_; }
+  std::span<const Instance> instances() const { return std::span(instances_).first(instance_count_); }
   Bounds3 bounds() const;  ///< of the scene, world space
   uint64_t resident_bytes() const;
   uint32_t more_levels() const { return options_.more_levels; }
@@ -113,7 +119,8 @@ class TopTree {
  private:
   std::vector<TopNode> nodes_;
   std::vector<TreeletEntry> entries_;
-  std::vector<Instance> instances_;
+  std::vector<Instance> instances_;  // and behind them the keys of those that move
+  uint32_t instance_count_ = 0;
   TraversalOptions options_;
   float world_pad_scale_ = 0;     ///< kWorldPad times the largest transform_error; see ray_space.h
   float world_extent_ = 0;        ///< E of ray_space.h, the largest of all instances

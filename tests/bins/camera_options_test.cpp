@@ -1,49 +1,8 @@
 // The options that say through what, and when, a scene is seen.
-#include "io/image.h"
-#include "tests/bins/small_scene.h"
+#include "tests/bins/seen_pictures.h"
 
 namespace shoal::testing {
 namespace {
-
-/// A triangle with a camera before it, and an animation that moves the triangle out of the picture.
-WrittenScene seen_triangle() {
-  WrittenScene scene = one_triangle();
-  scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
-  scene.add_node({{"camera", 0}, {"translation", {0.3, 0.3, 3}}});
-  const uint32_t input = scene.add_floats(1, {0, 1}), output = scene.add_floats(3, {0, 0, 0, 100, 0, 0});
-  scene.json["animations"] = {{{"name", "leave"},
-                               {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
-                               {"samplers", {{{"input", input}, {"output", output}}}}}};
-  return scene;
-}
-
-struct Pictures {
-  Pictures() { save(seen_triangle(), folder / "scene"); }
-
-  ProgramRun run(const std::string& name, const std::vector<std::string>& options,
-                 const std::string& scene = "scene/scene.gltf") const {
-    return run_shoal(folder, join({"render", folder / scene, "-o", folder / (name + ".exr"), "--width", "48", "--height",
-                                   "32", "--spp", "2", "--environment", "constant:1,1,1", "--cache-dir",
-                                   folder / "cache", "--quiet"},
-                                  options));
-  }
-  std::vector<float> render(const std::string& name, const std::vector<std::string>& options,
-                            const std::string& scene = "scene/scene.gltf") const {
-    expect_exit(run(name, options, scene), 0);
-    const auto image = read_exr(posix_file_system(), folder / (name + ".exr"), 1 << 20);
-    if (!image.ok()) {
-      ADD_FAILURE() << image.error().message;
-      return {};
-    }
-    std::vector<float> values;
-    for (const ExrChannel& channel : image.value().channels) {
-      values.insert(values.end(), channel.values.begin(), channel.values.end());
-    }
-    return values;
-  }
-
-  TemporaryFolder folder;
-};
 
 TEST(CameraOptions, WhatChangesNothingChangesNoBit) {
   const Pictures pictures;
@@ -94,13 +53,6 @@ TEST(CameraOptions, ABuiltSceneKeepsItsTime) {
   EXPECT_EQ(pictures.render("asked", {"--time", "0.001", "--animation", "leave"}, "later.shoal"), direct);
   expect_error(pictures.run("wrong", {"--time", "0"}, "later.shoal"), 2, {"later.shoal was built at 0.001 s", "--time"});
   expect_error(pictures.run("wrong", {"--time", "0", "--animation", "stay"}), 2, {"'stay'", "the scene has 1"});
-}
-
-TEST(CameraOptions, AShutterIsRefusedWithWhatToDo) {
-  const Pictures pictures;
-  const ProgramRun run = pictures.run("wrong", {"--shutter", "0:0.02"});
-  expect_exit(run, 2);
-  EXPECT_THAT(run.err, ::testing::HasSubstr("several --time"));
 }
 
 TEST(CameraOptions, WhatDoesNotGoTogetherExitsTwo) {

@@ -1,0 +1,183 @@
+// Nodes that move while the shutter is open: what the build makes of them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/light_sampler.h"
+#include "engine/motion_keys.h"
+#include "engine/place_instances.h"
+#include "tests/engine/built_scene.h"
+#include "treelets/moving_instance.h"
+
+namespace shoal::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A triangle below a node that an animation of one channel moves, and one that stands still beside it.
+struct MovingScene {
+  WrittenScene scene;
+  MovingScene(const char* path, uint32_t width, const std::vector<float>& times, const std::vector<float>& values) {
+    scene.add_node({{"mesh", scene.add_triangle_mesh(0, 1)}});
+    scene.add_node({{"mesh", scene.add_triangle_mesh(5, 1)}});
+    const uint32_t input = scene.add_floats(1, times), output = scene.add_floats(width, values);
+    scene.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", path}}}}}},
+                                 {"samplers", {{{"input", input}, {"output", output}}}}}};
+  }
+  BuiltScene build(double time, double open, double close) const {
+    MemoryFileSystem fs;
+    scene.save(fs);
+    SceneBuildOptions options;
+    options.pose.time = time;
+    options.pose.shutter = {open, close};
+    return build_and_open(fs, options);
+  }
+};
+
+TEST(MotionKeys, AMeshThatMovesIsAnObjectOfItsOwnThatGoesFromOpeningToClosing) {
+  const MovingScene moving("translation", 3, {0, 4}, {0, 0, 0, 8, 0, 0});
+  const BuiltScene built = moving.build(1, 0.5, 1);
+  const TopTree& tree = built.scene.top_tree;
+  ASSERT_EQ(tree.instance_count(), 2u);
+  EXPECT_FALSE(tree.instance(0).moves());  // the world, with the one that stands still
+  ASSERT_TRUE(tree.instance(1).moves());
+  EXPECT_EQ(instance_at(tree.instance(1), 0).object_to_world.translation, Vec3(3, 0, 0));
+  EXPECT_NEAR(instance_at(tree.instance(1), 0.25f).object_to_world.translation.x, 3.25f, 1e-5f);
+  EXPECT_EQ(instance_at(tree.instance(1), 1).object_to_world.translation, Vec3(4, 0, 0));
+  EXPECT_THAT(built.scene.build_record, HasSubstr("\"shutter\":[0.5,1.0]"));
+  EXPECT_TRUE(built.report.warnings.empty());
+}
+
+TEST(MotionKeys, WhatStandsStillWhileTheShutterIsOpenIsBaked) {
+  const MovingScene moving("translation", 3, {0, 4}, {0, 0, 0, 8, 0, 0});
+  const BuiltScene built = moving.build(5, 0, 1);  // after the last key
+  EXPECT_EQ(built.scene.top_tree.instance_count(), 1u);
+  EXPECT_FALSE(built.scene.top_tree.moves());
+  EXPECT_EQ(built.objects[0][0].position[0], 8.0f);
+}
+
+TEST(MotionKeys, ATurnHasSoManyKeysThatItStaysCloseToTheArc) {
+  const float half = std::sqrt(0.5f);
+  // Three quarters about z in three seconds.
+  const MovingScene moving("rotation", 4, {0, 1, 2, 3}, {0, 0, 0, 1, 0, 0, half, half, 0, 0, 1, 0, 0, 0, half, -half});
+  const BuiltScene built = moving.build(0, 0, 3);
+  const Instance& instance = built.scene.top_tree.instance(1);
+  ASSERT_TRUE(instance.moves());
+  EXPECT_GT(instance.key_count, 33u);
+  for (int i = 0; i <= 300; ++i) {
+    const double angle = 1.5 * 3.14159265358979 * i / 300;
+    const Vec3 corner = instance_at(instance, static_cast<float>(i) / 300).object_to_world.point({1, 0, 0});
+    EXPECT_NEAR(corner.x, std::cos(angle), 2e-3) << i;
+    EXPECT_NEAR(corner.y, std::sin(angle), 2e-3) << i;
+  }
+}
+
+TEST(MotionKeys, ChildrenGoWithTheirParentsAndWhatCannotBeBlurredIsNamed) {
+  MovingScene moving("translation", 3, {0, 1}, {0, 0, 0, 0, 2, 0});
+  WrittenScene& scene = moving.scene;
+  scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
+  scene.json["nodes"].push_back({{"mesh", 1}, {"camera", 0}, {"translation", {0, 0, 7}}});
+  scene.json["nodes"][0]["children"] = {2};
+  const BuiltScene built = moving.build(0, 0, 1);
+  size_t moving_count = 0;
+  for (const Instance& instance : built.scene.top_tree.instances()) {
+    if (!instance.moves()) continue;
+    ++moving_count;
+    EXPECT_NEAR(instance_at(instance, 0.5f).object_to_world.translation.y, 1, 1e-6f);
+  }
+  EXPECT_EQ(moving_count, 2u);
+  ASSERT_EQ(built.report.warnings.size(), 1u);
+  EXPECT_EQ(built.report.warnings[0], "nodes[2]: its camera is not blurred: it stands as in the middle of the shutter");
+  EXPECT_NEAR(built.scene.cameras[0].camera_to_world.translation.y, 1, 1e-6f);
+}
+
+constexpr double kPi = 3.14159265358979;
+
+/// So many turns about z while the shutter is open, off the origin, flattened and carried along.
+std::vector<AffineDouble> turning_keys(int count, double turns) {
+  std::vector<AffineDouble> keys(static_cast<size_t>(count));
+  for (int k = 0; k < count; ++k) {
+    const double part = static_cast<double>(k) / (count - 1), c = std::cos(2 * kPi * turns * part),
+                 s = std::sin(2 * kPi * turns * part);
+    keys[static_cast<size_t>(k)] = {{{c, s, 0}, {-3 * s, 3 * c, 0}, {0, 0, 0.1}}, {7 + part, -2, 0.5}};
+  }
+  return keys;
+}
+
+double largest_row_sum(const Affine3& m, const Affine3& back) { return absolute_row_sum(widened(m), widened(back)); }
+
+TEST(MotionKeys, BoundsAndErrorsHoldAFastTurnAtEveryTime) {
+  Bounds3 object;
+  object.include(Vec3(-1, 2, 0)), object.include(Vec3(4, 3, 50));
+  for (const auto& [count, turns] : {std::pair{17, 0.5}, {17, 1.9}, {3, 0.24}, {513, 8.0}, {17, 8.0}}) {
+    const auto placed = place_moving_instance(0, object, turning_keys(count, turns));
+    ASSERT_TRUE(placed);
+    std::vector<Instance> rows{placed->instance};
+    rows[0].motion_rows = 1, rows[0].key_count = static_cast<uint32_t>(count);
+    rows.insert(rows.end(), placed->keys.begin(), placed->keys.end());
+    for (int i = 0; i <= 3000; ++i) {
+      const Instance now = instance_at(rows[0], static_cast<float>(i) / 3000);
+      ASSERT_LE(largest_row_sum(now.object_to_world, now.world_to_object), now.transform_error * (1 + 1e-6)) << i;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 p((corner & 1) != 0 ? object.lo.x : object.hi.x, (corner & 2) != 0 ? object.lo.y : object.hi.y,
+                     (corner & 4) != 0 ? object.lo.z : object.hi.z);
+        const Vec3 at = now.object_to_world.point(p);
+        for (int axis = 0; axis < 3; ++axis) {
+          ASSERT_GE(at[axis], placed->bounds.lo[axis]) << i;
+          ASSERT_LE(at[axis], placed->bounds.hi[axis]) << i;
+        }
+        ASSERT_LT(glm::length(now.world_to_object.point(at) - p), 1e-3f) << i;
+      }
+    }
+  }
+}
+
+TEST(MotionKeys, BetweenKeysAnEighthOfATurnApartItJumps) {
+  Bounds3 object;
+  object.include(Vec3(0)), object.include(Vec3(1));
+  const auto jumps = [&](int count, double turns) {
+    const auto placed = place_moving_instance(0, object, turning_keys(count, turns));
+    return placed && std::all_of(placed->keys.begin(), placed->keys.end() - 1, stays);
+  };
+  EXPECT_FALSE(jumps(17, 0.5));
+  EXPECT_TRUE(jumps(17, 8));  // halves of a turn: straight ways would lead through the axis
+}
+
+TEST(MotionKeys, EmittersThatMoveAreNoLightsToSample) {
+  for (const uint64_t few : {0, 100}) {  // with a tree and without
+    MovingScene moving("translation", 3, {0, 4}, {0, 0, 0, 8, 0, 0});
+    moving.scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}}};
+    for (auto& mesh : moving.scene.json["meshes"]) mesh["primitives"][0]["material"] = 0;
+    const BuiltScene built = moving.build(1, 0.5, 1);
+    ASSERT_EQ(built.scene.emitters.size(), 2u);
+    const Environment none;
+    const LightSampler lights(built.scene, none, 1, few);
+    EXPECT_EQ(lights.has_tree(), few == 0);
+    const LightReceiver receiver{{2, 0.5f, 3}, 0};
+    const Material& material = built.scene.materials[built.scene.emitters[0].material];
+    double still_pdf = 0;
+    for (const Emitter& e : built.scene.emitters) {
+      const double pdf = lights.emitter_pdf(material, {e.instance, e.primitive, 0, 0}, receiver);
+      const bool moves = built.scene.top_tree.instance(e.instance).moves();
+      EXPECT_EQ(pdf > 0, !moves);
+      if (!moves) still_pdf = pdf * emitter_area(e);
+    }
+    EXPECT_NEAR(still_pdf, 1, 1e-6) << "all samples go to the one that stands still";
+    for (int i = 0; i < 1000; ++i) {
+      const LightSample sample = lights.sample(receiver.position, receiver, {(i + 0.5) / 1000, 0.3, 0.4});
+      if (sample.pdf > 0) EXPECT_FALSE(built.scene.top_tree.instance(sample.emitter->instance).moves());
+    }
+  }
+}
+
+TEST(MotionKeys, AMeshThatVanishesOnItsWayStandsAsInTheMiddle) {
+  const MovingScene moving("scale", 3, {0, 1, 2}, {1, 1, 1, 0, 0, 0, 1, 1, 1});
+  const BuiltScene built = moving.build(0, 0, 1);
+  EXPECT_FALSE(built.scene.top_tree.moves());
+  ASSERT_EQ(built.report.warnings.size(), 1u);
+  EXPECT_THAT(built.report.warnings[0], HasSubstr("it vanishes on its way"));
+}
+
+}  // namespace
+}  // namespace shoal::testing
