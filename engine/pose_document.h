@@ -21,7 +21,7 @@ struct PoseOptions {
   std::optional<double> time;  ///< seconds; without it, but with an animation: 0
   std::string animation;       ///< name or index; empty: the first
   /// --shutter: open from and to so many seconds after `time`.
-  std::optional<std::array<double, 2>> shutter;
+  std::optional<std::array<double, 2>> shutter{};
   bool wanted() const { return time.has_value() || !animation.empty() || shutter.has_value(); }
 };
 

@@ -172,7 +172,6 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     return 0;
   }
   counters_.path_state_moved_bytes += sizeof(PathState);
-  const uint64_t seed = context_.picture.shading.seed;
   uint32_t count = 0;
   if (result.has_shadow) {
     const uint32_t bounce_after = path.bounce;

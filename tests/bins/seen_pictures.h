@@ -29,10 +29,12 @@ struct Pictures {
   ProgramRun run(const std::string& name, const std::vector<std::string>& options,
                  const std::string& scene = "scene/scene.gltf") const {
     std::vector<std::string> all = join({"render", folder / scene, "-o", folder / (name + ".exr"), "--width", "48",
-                                         "--height", "32", "--environment", "constant:1,1,1", "--cache-dir",
-                                         folder / "cache", "--quiet"},
+                                         "--height", "32", "--cache-dir", folder / "cache", "--quiet"},
                                         options);
-    if (std::find(all.begin(), all.end(), "--spp") == all.end()) all = join(all, {"--spp", "2"});
+    const auto unless_asked = [&](const std::string& option, const std::string& value) {
+      if (std::find(all.begin(), all.end(), option) == all.end()) all = join(all, {option, value});
+    };
+    unless_asked("--spp", "2"), unless_asked("--environment", "constant:1,1,1");
     return run_shoal(folder, all);
   }
   /// Channels by name: A, B, G, R.

@@ -36,22 +36,21 @@ TEST(Shutter, AShutterShowsTheMeanOfItsTimesInEveryOrder) {
   }
 }
 
-/// Half a turn of the triangle about its corner, in a second.
-WrittenScene turning_triangle() {
+/// Half a turn of the triangle about its corner, in a second; or of the camera, about where it looks.
+WrittenScene turning_triangle(uint32_t node) {
   WrittenScene scene = one_triangle();
   scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}};
   scene.add_node({{"camera", 0}, {"translation", {0, 0, 3}}});
   const uint32_t input = scene.add_floats(1, {0, 1}), output = scene.add_floats(4, {0, 0, 0, 1, 0, 0, 1, 0});
-  scene.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "rotation"}}}}}},
+  scene.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", "rotation"}}}}}},
                                {"samplers", {{{"input", input}, {"output", output}}}}}};
   return scene;
 }
 
-TEST(Shutter, AFastTurnIsTheMeanOfStillPicturesInEveryPixel) {
-  const Pictures pictures;
-  save(turning_triangle(), pictures.folder / "turn");
+/// The blurred picture against the mean of still ones, pixel by pixel.
+void expect_mean_of_stills(const Pictures& pictures, const std::string& scene) {
   constexpr int kStills = 32, kStillSamples = 32, kSamples = 512;
-  const std::string scene = "turn/scene.gltf", samples = fmt::format("{}", kSamples);
+  const std::string samples = fmt::format("{}", kSamples);
   const std::vector<float> blurred =
       pictures.render("blurred", {"--shutter", "0:1", "--spp", samples, "--bounces", "1"}, scene);
   std::vector<double> mean(blurred.size());
@@ -74,6 +73,23 @@ TEST(Shutter, AFastTurnIsTheMeanOfStillPicturesInEveryPixel) {
   }
   EXPECT_GT(covered_pixels, 200);
   EXPECT_LT(std::abs(sum), 4.5 * std::sqrt(variance));
+}
+
+TEST(Shutter, AFastTurnIsTheMeanOfStillPicturesInEveryPixel) {
+  const Pictures pictures;
+  save(turning_triangle(0), pictures.folder / "turn");
+  expect_mean_of_stills(pictures, "turn/scene.gltf");
+}
+
+TEST(Shutter, ACameraThatTurnsSeesTheMeanOfStillPicturesInEveryOrder) {
+  const Pictures pictures;
+  save(turning_triangle(1), pictures.folder / "roll");
+  const std::string scene = "roll/scene.gltf";
+  expect_mean_of_stills(pictures, scene);
+  const std::vector<float> picture = pictures.render("roll", {"--shutter", "0:1", "--spp", "8"}, scene);
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid"}) {
+    EXPECT_EQ(pictures.render(order, {"--shutter", "0:1", "--spp", "8", "--order", order}, scene), picture) << order;
+  }
 }
 
 /// A white cube of side 1 about (far, 0, 0), and a node that takes it before the camera and turns it about that place.
@@ -155,8 +171,8 @@ TEST(Shutter, MovingTreeletsAreMetAlikeInEveryOrderByAnyThreadsWithFewPages) {
   const Pictures pictures;
   make_moving_cave(pictures.folder);
   const std::string source = pictures.folder / "cave/terrain.gltf", built = pictures.folder / "cave.shoal";
-  const std::vector<std::string> build = {"build", source, "-o", built, "--shutter", "0.2:0.9", "--treelet-size", "8K"};
-  expect_exit(run_shoal(pictures.folder, build), 0);
+  const std::vector<std::string> build = {"build", source, "-o", built, "--shutter", "0.2:0.9"};
+  expect_exit(run_shoal(pictures.folder, join(build, {"--treelet-size", "8K"})), 0);
   const auto render = [&](const std::string& name, const std::vector<std::string>& options) {
     return pictures.render(name, join(options, {"--bounces", "4", "--spp", "4"}), "cave.shoal");
   };
@@ -168,6 +184,78 @@ TEST(Shutter, MovingTreeletsAreMetAlikeInEveryOrderByAnyThreadsWithFewPages) {
     if (std::string_view(order) == "hybrid") continue;  // keeps all in memory
     EXPECT_EQ(render(order, {"--order", order, "--threads", "3", "--page-cache", "200K"}), picture) << order;
   }
+  expect_exit(run_shoal(pictures.folder, join(build, {"--treelet-size", "64K"})), 0);
+  EXPECT_EQ(render("larger", {"--threads", "2"}), picture);
+}
+
+/// A lamp that goes from the left to the right above a floor in a second, and another one, out of sight, so that it is
+/// an instance where it stands still, too.
+WrittenScene lamp_above_floor() {
+  WrittenScene scene;
+  scene.json["materials"] = {{{"pbrMetallicRoughness", {{"metallicFactor", 0}}}}, {{"emissiveFactor", {1, 1, 1}}}};
+  const uint32_t floor = scene.add_floats(3, {-4, -1, -4, 4, -1, -4, 0, -1, 6});
+  const uint32_t lamp = scene.add_floats(3, {-0.5f, 0.5f, 0, 0.5f, 0.5f, 0, 0, -0.2f, 0});
+  scene.add_node({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", floor}}}, {"material", 0}})}});
+  const uint32_t mesh = scene.add_mesh({{"attributes", {{"POSITION", lamp}}}, {"material", 1}});
+  scene.add_node({{"mesh", mesh}});
+  scene.add_node({{"mesh", mesh}, {"translation", {0, 0, 400}}});
+  scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
+  scene.add_node({{"camera", 0}, {"translation", {0, 0, 5}}});
+  const uint32_t input = scene.add_floats(1, {0, 1}), output = scene.add_floats(3, {-1, 0, 0, 1.5f, 0, 0});
+  scene.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}}}},
+                               {"samplers", {{{"input", input}, {"output", output}}}}}};
+  return scene;
+}
+
+TEST(Shutter, ALampThatMovesGivesTheLightOfItsStillPictures) {
+  const Pictures pictures;
+  save(lamp_above_floor(), pictures.folder / "lamp");
+  const auto light = [&](const std::vector<std::string>& options) {
+    const std::vector<float> picture = pictures.render(
+        "lamp", join(options, {"--environment", "constant:0,0,0", "--bounces", "2"}), "lamp/scene.gltf");
+    double sum = 0;
+    for (size_t i = 48 * 32; i < picture.size(); ++i) sum += picture[i];
+    return sum / static_cast<double>(picture.size());
+  };
+  double still = 0;
+  for (int i = 0; i < 16; ++i) still += light({"--time", fmt::format("{}", (i + 0.5) / 16), "--spp", "32"}) / 16;
+  EXPECT_NEAR(light({"--shutter", "0:1", "--spp", "512"}), still, 0.02 * still);
+}
+
+TEST(Shutter, ForcedOffEverythingStandsAsInTheMiddleAndForcedOnNothingChanges) {
+  const Pictures pictures;
+  WrittenScene scene = lamp_above_floor();
+  nlohmann::json& channels = scene.json["animations"][0]["channels"];
+  channels.push_back(channels[0]);
+  channels[1]["target"]["node"] = 3;  // the camera goes the same way, from where it is now
+  scene.json["animations"][0]["samplers"].push_back(scene.json["animations"][0]["samplers"][0]);
+  scene.json["animations"][0]["samplers"][1]["output"] = scene.add_floats(3, {-1, 0, 5, 2, 0, 5});
+  channels[1]["sampler"] = 1;
+  save(scene, pictures.folder / "lamp");
+  const auto render = [&](const std::vector<std::string>& options) {
+    return pictures.render("lamp", join(options, {"--spp", "4"}), "lamp/scene.gltf");
+  };
+  const std::vector<float> still = render({"--time", "0.5"}), blurred = render({"--shutter", "0:1"});
+  EXPECT_NE(blurred, still);
+  EXPECT_EQ(render({"--shutter", "0:1", "--effects=-motion"}), still);
+  EXPECT_EQ(render({"--shutter", "0:1", "--effects=+motion"}), blurred);
+  for (const char* choice : {"--effects=-motion", "--effects=+motion"}) {
+    EXPECT_EQ(render({"--time", "0.5", choice}), still) << choice;
+  }
+}
+
+TEST(Shutter, ThePlanOfEffectsSaysHowManyNodesMove) {
+  const Pictures pictures;
+  const auto info = [&](const std::string& name, const std::vector<std::string>& options) {
+    const std::string built = pictures.folder / name;
+    const std::vector<std::string> build = {"build", pictures.folder / "scene/scene.gltf", "-o", built};
+    expect_exit(run_shoal(pictures.folder, join(build, options)), 0);
+    return run_shoal(pictures.folder, {"info", built}).out;
+  };
+  EXPECT_THAT(info("blurred.shoal", {"--shutter", "0:0.01"}),
+              ::testing::HasSubstr("motion                on   1 node moves while the shutter is open\n"));
+  EXPECT_THAT(info("still.shoal", {}),
+              ::testing::HasSubstr("motion                off  no node moves while the shutter is open (--shutter of"));
 }
 
 TEST(Shutter, ABuiltSceneKeepsItsShutter) {

@@ -77,6 +77,30 @@ TEST(Camera, FramingShowsEveryCornerOfTheBounds) {
   }
 }
 
+TEST(Camera, StandsAtItsKeysAndGoesStraightBetweenThem) {
+  const std::vector<Affine3> keys = {{{2, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}},
+                                     {{0.8f, 0, -0.6f}, {0, 1, 0}, {0.6f, 0, 0.8f}, {4, 0, 0}},
+                                     {{-0.8f, 0, -0.6f}, {0, 1, 0}, {0.6f, 0, -0.8f}, {8, 2, 0}}};
+  const Camera camera(perspective(1), 4, 4, {}, keys);
+  ASSERT_TRUE(camera.moves());
+  const auto middle = [&](float time) {
+    const Camera now = camera.at(time);
+    EXPECT_FALSE(now.moves());
+    return now.ray(2, 2, kCorner);
+  };
+  expect_near(middle(0).direction, {0, 0, -1});
+  expect_near(middle(0.5f).direction, {-0.6f, 0, -0.8f});
+  expect_near(middle(0.5f).origin, {4, 0, 0});
+  expect_near(middle(1).origin, {8, 2, 0});
+  // Half the way from the first key, however long its axes are.
+  expect_near(middle(0.25f).origin, {2, 0, 0});
+  expect_near(middle(0.25f).direction, glm::normalize(Vec3(-0.3f, 0, -0.9f)));
+  // From the second to the third its axes turn by more than 45 degrees: it waits for that.
+  expect_near(middle(0.9f).origin, {4, 0, 0});
+  expect_near(middle(0.9f).direction, {-0.6f, 0, -0.8f});
+  EXPECT_FALSE(Camera(perspective(1), 4, 4).moves());
+}
+
 TEST(Camera, FramingNothingStillGivesACamera) {
   const CameraRecord record = frame_camera(Bounds3{});
   EXPECT_TRUE(std::isfinite(glm::length(record.camera_to_world.translation)));

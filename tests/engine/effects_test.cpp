@@ -136,7 +136,7 @@ TEST(Effects, ThePlanSaysWhatIsOnHowManyMaterialsCallForItAndWhichIsFirst) {
   EXPECT_FALSE(state("", "textures").on) << "no material that is used has one";
   EXPECT_FALSE(state("", "punctual-lights").on);
   EXPECT_FALSE(state("", "instance-transforms").on);
-  EXPECT_FALSE(state("", "motion-blur").on);
+  EXPECT_FALSE(state("", "motion").on);
   const std::string text = effects_plan_text(effects_plan(scene.value(), {}));
   EXPECT_NE(text.find("sheen                 on   1 material, first \"velvet\""), std::string::npos) << text;
   EXPECT_NE(text.find("clearcoat             off  no material calls for it"), std::string::npos) << text;

@@ -73,12 +73,13 @@ TEST(MotionKeys, ATurnHasSoManyKeysThatItStaysCloseToTheArc) {
   }
 }
 
-TEST(MotionKeys, ChildrenGoWithTheirParentsAndWhatCannotBeBlurredIsNamed) {
+TEST(MotionKeys, ChildrenAndCamerasGoWithTheirParents) {
   MovingScene moving("translation", 3, {0, 1}, {0, 0, 0, 0, 2, 0});
   WrittenScene& scene = moving.scene;
   scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.1}}}}};
   scene.json["nodes"].push_back({{"mesh", 1}, {"camera", 0}, {"translation", {0, 0, 7}}});
   scene.json["nodes"][0]["children"] = {2};
+  scene.add_node({{"camera", 0}});
   const BuiltScene built = moving.build(0, 0, 1);
   size_t moving_count = 0;
   for (const Instance& instance : built.scene.top_tree.instances()) {
@@ -87,9 +88,60 @@ TEST(MotionKeys, ChildrenGoWithTheirParentsAndWhatCannotBeBlurredIsNamed) {
     EXPECT_NEAR(instance_at(instance, 0.5f).object_to_world.translation.y, 1, 1e-6f);
   }
   EXPECT_EQ(moving_count, 2u);
-  ASSERT_EQ(built.report.warnings.size(), 1u);
-  EXPECT_EQ(built.report.warnings[0], "nodes[2]: its camera is not blurred: it stands as in the middle of the shutter");
-  EXPECT_NEAR(built.scene.cameras[0].camera_to_world.translation.y, 1, 1e-6f);
+  EXPECT_TRUE(built.report.warnings.empty());
+  ASSERT_EQ(built.scene.cameras.size(), 2u);
+  const CameraRecord& camera = built.scene.cameras[0];
+  EXPECT_NEAR(camera.camera_to_world.translation.y, 1, 1e-6f);
+  ASSERT_EQ(camera.key_count, 17u);
+  EXPECT_EQ(built.scene.camera_keys[camera.first_key].translation, Vec3(0, 0, 7));
+  EXPECT_EQ(built.scene.camera_keys[camera.first_key + 16].translation, Vec3(0, 2, 7));
+  EXPECT_EQ(built.scene.cameras[1].key_count, 0u);
+}
+
+TEST(MotionKeys, WhatCannotBeBlurredIsNamedAndStandsAsInTheMiddle) {
+  MovingScene moving("translation", 3, {0, 1}, {0, 0, 0, 0, 2, 0});
+  WrittenScene& scene = moving.scene;
+  nlohmann::json& json = scene.json;
+  json["extensionsUsed"] = {"KHR_lights_punctual", "EXT_mesh_gpu_instancing"};
+  json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};
+  json["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  const uint32_t places = scene.add_floats(3, {0, 0, 1, 0, 0, 2});
+  json["nodes"].push_back(
+      {{"mesh", 1}, {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", places}}}}}}}});
+  const nlohmann::json bent = {{"POSITION", scene.add_floats(3, {0, 0, 0, 1, 0, 0, 0, 1, 0})},
+                               {"JOINTS_0", scene.add_bytes(4, std::vector<uint8_t>(12), false)},
+                               {"WEIGHTS_0", scene.add_floats(4, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0})}};
+  const uint32_t skinned = scene.add_mesh({{"attributes", bent}});
+  json["skins"] = {{{"joints", {0}}}, {{"joints", {1}}}};
+  json["nodes"].push_back({{"mesh", skinned}, {"skin", 0}});  // below a node that moves, too
+  json["nodes"][0]["children"] = {2, 3, 4};
+  scene.add_node({{"mesh", skinned}, {"skin", 1}});  // whose joint stands still
+  const uint32_t lift = scene.add_floats(3, {0, 0, 3, 0, 0, 3, 0, 0, 3});
+  const uint32_t morphed = scene.add_mesh({{"attributes", {{"POSITION", bent["POSITION"]}}},
+                                           {"targets", {{{"POSITION", lift}}}}});
+  scene.add_node({{"mesh", morphed}});
+  const uint32_t input = scene.add_floats(1, {0, 1}), output = scene.add_floats(1, {0, 1});
+  nlohmann::json& animation = json["animations"][0];
+  animation["channels"].push_back({{"sampler", 1}, {"target", {{"node", 6}, {"path", "weights"}}}});
+  animation["samplers"].push_back({{"input", input}, {"output", output}});
+  const BuiltScene built = moving.build(0, 0, 1);
+  EXPECT_THAT(built.report.warnings,
+              ::testing::UnorderedElementsAre(
+                  "nodes[2]: its light is not blurred: it stands as in the middle of the shutter",
+                  "nodes[3]: its instances are not blurred: they stand as in the middle of the shutter",
+                  "nodes[4]: its skin is not blurred: it stands as in the middle of the shutter",
+                  "nodes[6]: its morph targets are not blurred: they stand as in the middle of the shutter"));
+  EXPECT_EQ(built.scene.lights[0].position[1], 1.0f);
+  size_t moving_count = 0;
+  for (const Instance& instance : built.scene.top_tree.instances()) moving_count += instance.moves();
+  EXPECT_EQ(moving_count, 1u);
+  size_t bent_count = 0, lifted_count = 0;
+  for (const ReadTriangle& t : built.objects[0]) {
+    bent_count += t.position[0] == 0 && t.position[1] == 1 && t.position[2] == 0;
+    lifted_count += t.position[2] == 1.5f;
+  }
+  EXPECT_EQ(bent_count, 1u) << "the skin, as its joint is in the middle";
+  EXPECT_EQ(lifted_count, 1u) << "half a target";
 }
 
 constexpr double kPi = 3.14159265358979;

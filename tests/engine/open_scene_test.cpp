@@ -152,6 +152,8 @@ TEST_F(OpenScene, RefusesWhatWouldBeReadOutsideItsTable) {
       {"emitter position", [](OpenedFile& f) { f.rows<Emitter>(tables::kEmitters)->position[4] = INFINITY; }},
       {"light", [](OpenedFile& f) { f.rows<PunctualLight>(tables::kLights)->type = PunctualType{9}; }},
       {"camera", [](OpenedFile& f) { f.rows<CameraRecord>(tables::kCameras)->tan_half_yfov = NAN; }},
+      {"camera keys", [](OpenedFile& f) { f.rows<CameraRecord>(tables::kCameras)->key_count = 2; }},
+      {"first camera key", [](OpenedFile& f) { f.rows<CameraRecord>(tables::kCameras)->first_key = 1; }},
       {"geometry page", [](OpenedFile& f) { f.rows<TreeletPages>(tables::kTreelets)->geometry = 0; }},
       {"no attributes", [](OpenedFile& f) { f.rows<TreeletPages>(tables::kTreelets)[1].attributes = kNoPage; }},
       {"triangles", [](OpenedFile& f) { f.rows<TreeletPages>(tables::kTreelets)->triangle_count ^= 1; }},

@@ -134,6 +134,10 @@ TEST(Animation, EachPoseHasAPlaceOfItsOwnInTheCache) {
   EXPECT_NE(key({}), key(at_time(0)));
   EXPECT_NE(key(at_time(0)), key(at_time(1)));
   EXPECT_EQ(key(at_time(0.5)), key(at_time(0.5, "0")));
+  SceneBuildOptions blurred = at_time(0.5), longer = at_time(0.5);
+  blurred.pose.shutter = {0, 0.25}, longer.pose.shutter = {0, 0.5};
+  EXPECT_NE(key(at_time(0.5)), key(blurred));
+  EXPECT_NE(key(longer), key(blurred));
 }
 
 TEST(Animation, ATimeForASceneWithoutAnimationIsRefused) {

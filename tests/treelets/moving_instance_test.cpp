@@ -1,10 +1,12 @@
 // Instances that move: where they stand at a time, and that rays of every time meet them there.
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <random>
 
 #include "tests/support/hand_made_scene.h"
 #include "treelets/moving_instance.h"
+#include "treelets/trace_treelet_scalar.h"
 
 namespace shoal {
 namespace {
@@ -109,9 +111,11 @@ TEST(MovingInstance, RaysOfEveryTimeMeetItWhereBruteForceMeetsItsPoseThen) {
     Ray ray = make_ray(origin, random_vector(random, 1.0f) - origin + Vec3(time, 0, 0), kRayInfinity, i % 4 == 0);
     ray.alpha_seed = seed_of(time);
     TestScene still = {{}, {}, {instance_at(scene.instances[0], ray.time()), scene.instances[1]}, {}, scene.objects};
-    Ray expected = ray;
+    Ray expected = ray, scalar = ray;
     brute_force(still, expected);
     trace_scene(tree, scene.pages, ray, trace_treelet);
+    trace_scene(tree, scene.pages, scalar, trace_treelet_scalar);
+    ASSERT_EQ(std::memcmp(&scalar, &ray, sizeof(Ray)), 0) << i;
     ASSERT_EQ(ray.hit.valid(), expected.hit.valid()) << i;
     hits += ray.hit.valid(), of_the_moving_one += ray.hit.valid() && ray.hit.instance == 0;
     if (ray.any_hit() || !ray.hit.valid()) continue;
