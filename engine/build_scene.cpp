@@ -253,8 +253,10 @@ class SceneBuilder {
       report_.warnings.push_back(fmt::format("an instance of {} is left out: its matrix has no inverse", name));
       return {};
     }
+    Instance shown = placed->instance;
+    if (!placed->keys.empty()) shown.identity = 1;  // lights that move are stored as their object has them
     SHOAL_RETURN_IF_ERROR(
-        append_emitters(emitters_of_[object], placed->instance, static_cast<uint32_t>(placed_.size()), emitters_));
+        append_emitters(emitters_of_[object], shown, static_cast<uint32_t>(placed_.size()), emitters_));
     report_.instanced_triangles_count += built_[object].triangles_count;
     placed_.push_back(*placed);
     return {};

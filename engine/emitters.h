@@ -17,7 +17,7 @@ inline constexpr uint64_t kMaxEmitters = 1u << 25;
 /// The emissive triangles of an object, in object space, in order of primitive; instance is 0.
 std::vector<Emitter> collect_emitters(const TriangleSoup& soup, std::span<const Material> materials);
 
-/// Appends them as `instance` shows them: positions by Affine3::point in float, as shading moves them. Triangles
+/// Appends them as `instance` shows them (as they are, where it is an identity): positions by Affine3::point in float, as shading moves them. Triangles
 /// without area are left out. Fails with: kInput (more than kMaxEmitters).
 Status append_emitters(std::span<const Emitter> of_object, const Instance& instance, uint32_t instance_index,
                        std::vector<Emitter>& out);

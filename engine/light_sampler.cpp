@@ -6,6 +6,7 @@
 #include "engine/frame.h"
 #include "engine/math.h"
 #include "engine/tree_lights.h"
+#include "treelets/moving_instance.h"
 
 namespace shoal {
 namespace {
@@ -68,8 +69,20 @@ LightSampler::LightSampler(const Scene& scene, const LightSources& sources, cons
   weigh_choices();
 }
 
+/// The corners of one that moves are those of its object.
+Emitter LightSampler::emitter_at(const Emitter& emitter, float time) const {
+  Emitter placed = emitter;
+  if (!moves(emitter.instance)) return placed;
+  const Instance now = instance_at(scene_->top_tree.instance(emitter.instance), time);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 p = now.object_to_world.point(corner(emitter, k));
+    placed.position[3 * k] = p.x, placed.position[3 * k + 1] = p.y, placed.position[3 * k + 2] = p.z;
+  }
+  return placed;
+}
+
+/// `emitter`: as it stands in the middle of the shutter.
 double LightSampler::weight_of(const Emitter& emitter) const {
-  if (moves(emitter.instance)) return 0;
   const double weight = emitter_area(emitter) * sampled_weight(sources_.materials[emitter.material]);
   return weight > 0 && std::isfinite(weight) ? weight : 0.0;
 }
@@ -77,7 +90,8 @@ double LightSampler::weight_of(const Emitter& emitter) const {
 template <class Use>
 void LightSampler::each_placed(const Use& use) const {
   for (uint32_t i = 0; i < sources_.emitters.size(); ++i) {
-    if (const double weight = weight_of(sources_.emitters[i]); weight > 0) use(sources_.emitters[i], weight, i);
+    const Emitter emitter = emitter_at(sources_.emitters[i], 0.5f);
+    if (const double weight = weight_of(emitter); weight > 0) use(emitter, weight, i);
   }
   for (uint32_t i = 0; i < sources_.lights.size(); ++i) {
     const PunctualLight& light = sources_.lights[i];
@@ -113,7 +127,7 @@ void LightSampler::weigh_choices() {
 void LightSampler::weigh_emitters() {
   std::vector<double> weights;
   weights.reserve(sources_.emitters.size());
-  for (const Emitter& e : sources_.emitters) weights.push_back(weight_of(e));
+  for (const Emitter& e : sources_.emitters) weights.push_back(weight_of(emitter_at(e, 0.5f)));
   emitters_ = Distribution1D(weights);
 }
 
@@ -157,7 +171,7 @@ uint64_t LightSampler::resident_bytes() const {
 }
 
 LightSample LightSampler::sample(const Vec3& position, const LightReceiver& receiver,
-                                 const LightRandom& random) const {
+                                 const LightRandom& random, float time) const {
   double inside = 0;
   const size_t choice = choices_.sample(random.choice, &inside);
   const double chance = choices_.probability(choice);
@@ -165,29 +179,51 @@ LightSample LightSampler::sample(const Vec3& position, const LightReceiver& rece
   if (choice > singles_.size()) return sample_environment(chance, random);
   if (!has_tree()) {
     const size_t index = emitters_.sample(inside, nullptr);
-    return sample_emitter(index, position, chance * emitters_.probability(index), random);
+    return sample_emitter(index, position, chance * emitters_.probability(index), random, time);
   }
   const LightTree::Choice placed = tree_.sample(receiver, inside);
   if (!(placed.chance > 0)) return {};
   const size_t emitters = sources_.emitters.size();
-  if (placed.light < emitters) return sample_emitter(placed.light, position, chance * placed.chance, random);
+  if (placed.light < emitters) return sample_emitter(placed.light, position, chance * placed.chance, random, time);
   return sample_punctual(sources_.lights[placed.light - emitters], position, chance * placed.chance);
 }
 
-double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const {
+const Emitter* LightSampler::find_emitter(const Hit& hit) const {
   const std::span<const Emitter> emitters = sources_.emitters;
   const auto found = std::lower_bound(emitters.begin(), emitters.end(), hit, [](const Emitter& e, const Hit& h) {
     return e.instance != h.instance ? e.instance < h.instance : e.primitive < h.primitive;
   });
-  if (found == emitters.end() || found->instance != hit.instance || found->primitive != hit.primitive) return 0;
-  const double chance = tree_.chance(receiver, static_cast<uint32_t>(found - emitters.begin()));
-  return chance > 0 ? choices_.probability(singles_.size()) * chance / emitter_area(*found) : 0.0;
+  const bool there = found != emitters.end() && found->instance == hit.instance && found->primitive == hit.primitive;
+  return there ? &*found : nullptr;
+}
+
+double LightSampler::area_at(const Emitter& emitter, float time) const {
+  return moves(emitter.instance) ? emitter_area(emitter_at(emitter, time)) : emitter_area(emitter);
+}
+
+/// Its area in the middle of the shutter over that at `time`.
+double LightSampler::shrinking(const Hit& hit, float time) const {
+  const Emitter* const emitter = find_emitter(hit);
+  if (emitter == nullptr) return 0;
+  const double area = area_at(*emitter, time);
+  return area > 0 ? area_at(*emitter, 0.5f) / area : 0.0;
+}
+
+double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const {
+  const Emitter* const emitter = find_emitter(hit);
+  if (emitter == nullptr) return 0;
+  const double chance = tree_.chance(receiver, static_cast<uint32_t>(emitter - sources_.emitters.data()));
+  const double area = chance > 0 ? area_at(*emitter, time) : 0.0;
+  return area > 0 ? choices_.probability(singles_.size()) * chance / area : 0.0;
 }
 
 LightSample LightSampler::sample_emitter(size_t index, const Vec3& position, double chance,
-                                         const LightRandom& random) const {
+                                         const LightRandom& random, float time) const {
   LightSample sample;
-  const Emitter& e = sources_.emitters[index];
+  const Emitter& row = sources_.emitters[index];
+  std::optional<Emitter> placed;
+  if (moves(row.instance)) placed = emitter_at(row, time);
+  const Emitter& e = placed ? *placed : row;
   const DVec3 area_vector = doubled_area_vector(e);
   const double doubled_area = glm::length(area_vector);
 
@@ -206,7 +242,7 @@ LightSample LightSampler::sample_emitter(size_t index, const Vec3& position, dou
   sample.direction = Vec3(to_light / std::sqrt(distance2));
   sample.target_normal = Vec3(area_vector * ((cosine > 0 ? -1 : 1) / doubled_area));
   sample.radiance = Vec3(1);
-  sample.emitter = &e;
+  sample.emitter = &row;
   sample.pdf = chance / (0.5 * doubled_area) * distance2 / std::abs(cosine);
   return sample;
 }

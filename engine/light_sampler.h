@@ -48,7 +48,6 @@ struct LightSources {
   std::span<const Emitter> emitters;
   std::span<const PunctualLight> lights;
   std::span<const Material> materials;  ///< of the emitters
-  bool frozen = false;  ///< nothing moves, whatever the scene says
 };
 
 class LightSampler {
@@ -58,22 +57,24 @@ class LightSampler {
 
   /// Keeps references to what it is given. `threads` build the tree, if there are more placed lights than `few`.
   LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights)
-      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials, false}, environment, threads, few) {}
+      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials}, environment, threads, few) {}
   LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment, unsigned threads,
                uint64_t few);
 
   bool empty() const { return !(choices_.total() > 0); }
   /// Light is chosen by where it arrives: without, the receiver that the others take does not matter.
   bool has_tree() const { return !tree_.empty(); }
-  /// Requires: !empty(). Light is chosen for `receiver` and sampled from `position`.
-  LightSample sample(const Vec3& position, const LightReceiver& receiver, const LightRandom& random) const;
+  /// Requires: !empty(). Light is chosen for `receiver` and sampled from `position`, where it is at `time` of the shutter;
+  /// chances are those of where lights that move are in the middle of it.
+  LightSample sample(const Vec3& position, const LightReceiver& receiver, const LightRandom& random,
+                     float time = 0.5f) const;
 
   /// Density by area with which sample() finds a point on the emissive triangle that was hit, of this material; 0 when it
   /// never does.
-  double emitter_pdf(const Material& material, const Hit& hit, const LightReceiver& receiver) const {
-    if (moves(hit.instance)) return 0;
-    if (has_tree()) return tree_emitter_pdf(hit, receiver);
-    return emitter_density_ * sampled_weight(material);
+  double emitter_pdf(const Material& material, const Hit& hit, const LightReceiver& receiver, float time = 0.5f) const {
+    if (has_tree()) return tree_emitter_pdf(hit, receiver, time);
+    const double pdf = emitter_density_ * sampled_weight(material);
+    return pdf > 0 && moves(hit.instance) ? pdf * shrinking(hit, time) : pdf;
   }
   /// Solid-angle density with which sample() finds a direction to the environment.
   double environment_pdf(const Vec3& direction) const;
@@ -88,14 +89,18 @@ class LightSampler {
 
  private:
   /// Emitters with coverage are found by chance only: a shadow ray ends before the emitter and so cannot ask whether
-  /// the emitter is there. So are those that move: their area and place would have to be those of the path's time.
+  /// the emitter is there.
   static double sampled_weight(const Material& material) {
     return material.coverage == CoverageMode::kOpaque ? material.emission_weight : 0.0f;
   }
   bool moves(uint32_t instance) const {
     const TopTree& tree = scene_->top_tree;
-    return !sources_.frozen && instance < tree.instance_count() && tree.instance(instance).moves();
+    return tree.moves() && instance < tree.instance_count() && tree.instance(instance).moves();
   }
+  Emitter emitter_at(const Emitter& emitter, float time) const;
+  const Emitter* find_emitter(const Hit& hit) const;
+  double area_at(const Emitter& emitter, float time) const;
+  double shrinking(const Hit& hit, float time) const;
   double weight_of(const Emitter& emitter) const;
   void weigh_choices();
   void plant_tree(unsigned threads, uint64_t few);
@@ -104,10 +109,11 @@ class LightSampler {
   template <class Use>
   void each_placed(const Use& use) const;
   void weigh_emitters();
-  LightSample sample_emitter(size_t index, const Vec3& position, double chance, const LightRandom& random) const;
+  LightSample sample_emitter(size_t index, const Vec3& position, double chance, const LightRandom& random,
+                             float time) const;
   LightSample sample_punctual(const PunctualLight& light, const Vec3& position, double chance) const;
   LightSample sample_environment(double chance, const LightRandom& random) const;
-  double tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver) const;
+  double tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const;
 
   const Scene* scene_;
   LightSources sources_;

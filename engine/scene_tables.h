@@ -167,7 +167,7 @@ struct Texture {
   uint8_t nearest = 0;
 };
 
-/// An emissive triangle in world space, in order of (instance, primitive).
+/// An emissive triangle in world space, of an instance that moves in its object's; in order of (instance, primitive).
 struct Emitter {
   float position[9];
   float uv[6];          ///< of the emissive texture's set

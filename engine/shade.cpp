@@ -85,8 +85,7 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   const Instance& instance = scene_->top_tree.instance(path.hit.instance);
   const TriangleTest test = options_->triangle_test;
   const Surface surface =
-      instance.moves() ? find_surface(path, instance_at(instance, time_of(path, options_->seed, times_)), geometry,
-                                      attributes, test)
+      instance.moves() ? find_surface(path, instance_at(instance, time_of(path)), geometry, attributes, test)
                        : find_surface(path, instance, geometry, attributes, test);
   const Material& material = materials_[surface.attributes.material];
   const uint32_t effects = kOnlyLambert ? 0 : options_->effects.of(material.effects);
@@ -162,7 +161,7 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
   float weight = 1;
   double area_pdf = 0;  // the camera draws no light
   if (path.bsdf_pdf > 0) {
-    area_pdf = tables_->impl().lights->emitter_pdf(material, path.hit, {path.origin, path.light_side});
+    area_pdf = tables_->impl().lights->emitter_pdf(material, path.hit, {path.origin, path.light_side}, time_of(path));
   }
   if (area_pdf > 0) {
     const glm::dvec3 along = glm::dvec3(surface.position.point) - glm::dvec3(path.origin);
@@ -185,7 +184,7 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
   }
   const LightSample light =
       lights.sample(surface.position.point, receiver,
-                    {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)});
+                    {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)}, time_of(path));
   if (!(light.pdf > 0)) return {};
   const BsdfValue f = bsdf.evaluate(light.direction);
   if (f.value == Vec3(0)) return {};
@@ -216,10 +215,16 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
     return {};
   }
   // The ray ends at t = 1, just before the emitter.
-  const BoundedPoint target = ray_end(light.target, result.shadow_origin, light.instance);
+  const BoundedPoint target = shadow_end(path, light, result.shadow_origin);
   result.shadow_direction = offset_point(target, light.target_normal) - result.shadow_origin;
   result.shadow_t_max = 1;
   return {};
+}
+
+BoundedPoint Shader::shadow_end(const PathState& path, const LightSample& light, const Vec3& origin) const {
+  if (light.instance == nullptr || !light.instance->moves()) return ray_end(light.target, origin, light.instance);
+  const Instance now = instance_at(*light.instance, time_of(path));
+  return ray_end(light.target, origin, &now);
 }
 
 template <class AnyBsdf>

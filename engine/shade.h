@@ -127,6 +127,7 @@ class Shader {
   template <class AnyBsdf>
   Status sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                       ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters);
+  BoundedPoint shadow_end(const PathState& path, const LightSample& light, const Vec3& origin) const;
   template <class AnyBsdf>
   void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                      ShadeResult& result) const;
@@ -134,6 +135,10 @@ class Shader {
                        TextureContext& textures);
   TextureContext context(ShadeCounters& counters, CacheCounters& cache_counters);
   const MaterialLayers& layers_of(const Material& material) const;
+  /// Of the shutter.
+  float time_of(const PathState& path) const {
+    return times_ == ShutterTimes::kNone ? 0.5f : shoal::time_of(path, options_->seed, times_);
+  }
 
   const Scene* scene_;
   const ShadingTables* tables_;

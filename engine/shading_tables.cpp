@@ -74,7 +74,7 @@ Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, con
     SHOAL_ASSIGN_OR_RETURN(impl->environment, make_environment(fs, options.environment));
   }
   const std::span<const Material> materials = impl->materials.materials();
-  LightSources sources{scene.emitters, scene.lights, materials, (effects.off & kEffectMotion) != 0};
+  LightSources sources{scene.emitters, scene.lights, materials};
   if ((effects.off & kEffectEmission) != 0) sources.emitters = {};
   if ((effects.off & kEffectPunctualLights) != 0) sources.lights = {};
   const bool planted = options.light_choice == LightChoice::kTree;

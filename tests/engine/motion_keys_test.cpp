@@ -14,6 +14,7 @@ namespace shoal::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using DVec3 = glm::dvec3;
 
 /// A triangle below a node that an animation of one channel moves, and one that stands still beside it.
 struct MovingScene {
@@ -196,29 +197,46 @@ TEST(MotionKeys, BetweenKeysAnEighthOfATurnApartItJumps) {
   EXPECT_TRUE(jumps(17, 8));  // halves of a turn: straight ways would lead through the axis
 }
 
-TEST(MotionKeys, EmittersThatMoveAreNoLightsToSample) {
+TEST(MotionKeys, EmittersThatMoveAreSampledWhereTheyAreAtThatTime) {
+  MovingScene moving("scale", 3, {0, 4}, {1, 1, 1, 3, 3, 3});
+  moving.scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}}};
+  for (auto& mesh : moving.scene.json["meshes"]) mesh["primitives"][0]["material"] = 0;
+  const BuiltScene built = moving.build(1, 0, 2);  // it grows from 1.5 to 2.5
+  ASSERT_EQ(built.scene.emitters.size(), 2u);
+  const Material& material = built.scene.materials[built.scene.emitters[0].material];
+  const LightReceiver receiver{{2, 0.5f, 3}, 0};
+  const Environment none;
   for (const uint64_t few : {0, 100}) {  // with a tree and without
-    MovingScene moving("translation", 3, {0, 4}, {0, 0, 0, 8, 0, 0});
-    moving.scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}}};
-    for (auto& mesh : moving.scene.json["meshes"]) mesh["primitives"][0]["material"] = 0;
-    const BuiltScene built = moving.build(1, 0.5, 1);
-    ASSERT_EQ(built.scene.emitters.size(), 2u);
-    const Environment none;
     const LightSampler lights(built.scene, none, 1, few);
     EXPECT_EQ(lights.has_tree(), few == 0);
-    const LightReceiver receiver{{2, 0.5f, 3}, 0};
-    const Material& material = built.scene.materials[built.scene.emitters[0].material];
-    double still_pdf = 0;
-    for (const Emitter& e : built.scene.emitters) {
-      const double pdf = lights.emitter_pdf(material, {e.instance, e.primitive, 0, 0}, receiver);
-      const bool moves = built.scene.top_tree.instance(e.instance).moves();
-      EXPECT_EQ(pdf > 0, !moves);
-      if (!moves) still_pdf = pdf * emitter_area(e);
-    }
-    EXPECT_NEAR(still_pdf, 1, 1e-6) << "all samples go to the one that stands still";
-    for (int i = 0; i < 1000; ++i) {
-      const LightSample sample = lights.sample(receiver.position, receiver, {(i + 0.5) / 1000, 0.3, 0.4});
-      if (sample.pdf > 0) EXPECT_FALSE(built.scene.top_tree.instance(sample.emitter->instance).moves());
+    for (const float time : {0.0f, 0.3f, 0.5f, 1.0f}) {
+      const double size = 1.5 + time;
+      double chance = 0;
+      for (const Emitter& e : built.scene.emitters) {
+        const bool moves = built.scene.top_tree.instance(e.instance).moves();
+        const double pdf = lights.emitter_pdf(material, {e.instance, e.primitive, 0, 0}, receiver, time);
+        EXPECT_GT(pdf, 0);
+        chance += pdf * (moves ? 0.5 * size * size : 0.5);
+      }
+      EXPECT_NEAR(chance, 1, 1e-5) << few << " " << time;
+      size_t moved = 0;
+      double farthest = 0;
+      for (int i = 0; i < 1000; ++i) {
+        const LightSample sample =
+            lights.sample(receiver.position, receiver, {(i + 0.5) / 1000, i % 31 / 31.0, i % 37 / 37.0}, time);
+        ASSERT_GT(sample.pdf, 0);
+        const Hit hit{sample.emitter->instance, sample.emitter->primitive, 0, 0};
+        const DVec3 way = DVec3(sample.target.point) - DVec3(receiver.position);
+        const double cosine = std::abs(glm::dot(way, DVec3(0, 0, 1))) / glm::length(way);
+        EXPECT_NEAR(lights.emitter_pdf(material, hit, receiver, time) * glm::dot(way, way) / cosine, sample.pdf,
+                    1e-5 * sample.pdf);
+        if (!sample.instance->moves()) continue;
+        ++moved;
+        farthest = std::max<double>(farthest, sample.target.point.x + sample.target.point.y);
+      }
+      EXPECT_GT(moved, 300u);
+      EXPECT_LT(farthest, size * (1 + 1e-6));
+      EXPECT_GT(farthest, size * 0.95);
     }
   }
 }
