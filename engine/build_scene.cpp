@@ -226,8 +226,11 @@ class SceneBuilder {
     report_.chunks_count += built.chunks_count;
     report_.scratch_written_bytes += built.scratch_written_bytes;
     report_.scratch_read_bytes += built.scratch_read_bytes;
-    emitters_of_.push_back(std::move(built.emitters));
-    built_.push_back(std::move(built.object));
+    if (!built.object.nodes.empty()) {
+      emitters_of_.push_back(std::move(built.emitters));
+      built_.push_back(std::move(built.object));
+      built_plans_.push_back(&object);
+    }
     give_back_freed_memory();
     return {};
   }
@@ -264,12 +267,12 @@ class SceneBuilder {
 
   Status place_objects() {
     for (uint32_t i = 0; i < built_.size(); ++i) {
-      if (built_[i].nodes.empty()) continue;
-      if (geometry_.objects[i].baked) {
+      const ObjectPlan& object = *built_plans_[i];
+      if (object.baked) {
         SHOAL_RETURN_IF_ERROR(place(i, PlacedItem{}, "the world object"));
         continue;
       }
-      const uint32_t mesh = geometry_.objects[i].meshes[0];
+      const uint32_t mesh = object.meshes[0];
       for (const uint32_t p : geometry_.meshes[mesh].placements) {
         SHOAL_RETURN_IF_ERROR(place(i, flat_.meshes[p], fmt::format("meshes[{}]", mesh)));
       }
@@ -334,11 +337,11 @@ class SceneBuilder {
     return append_rows(writer, tables::kBakedMeshes, baked_meshes());
   }
 
-  /// The first primitive of each mesh of the world object.
+  /// The first primitive of each mesh of the world object; none where nothing is left of it.
   std::vector<uint32_t> baked_meshes() const {
     std::vector<uint32_t> first;
-    if (geometry_.objects.empty() || !geometry_.objects[0].baked) return first;
-    for (const uint32_t mesh : geometry_.objects[0].meshes) {
+    if (built_plans_.empty() || !built_plans_[0]->baked) return first;
+    for (const uint32_t mesh : built_plans_[0]->meshes) {
       first.push_back(geometry_.meshes[mesh].primitives.front().first_id);
     }
     return first;
@@ -354,7 +357,8 @@ class SceneBuilder {
   GeometryPlan geometry_;
   MaterialPlan materials_;
   TiledTextures textures_;
-  std::vector<BuiltObject> built_;                 // parallel to geometry_.objects
+  std::vector<BuiltObject> built_;                 // without those that have no triangle left
+  std::vector<const ObjectPlan*> built_plans_;     // parallel to built_
   std::vector<std::vector<Emitter>> emitters_of_;  // likewise, object space
   std::vector<PlacedInstance> placed_;
   std::vector<Emitter> emitters_;

@@ -64,8 +64,8 @@ class LightSampler {
   bool empty() const { return !(choices_.total() > 0); }
   /// Light is chosen by where it arrives: without, the receiver that the others take does not matter.
   bool has_tree() const { return !tree_.empty(); }
-  /// Requires: !empty(). Light is chosen for `receiver` and sampled from `position`, where it is at `time` of the shutter;
-  /// chances are those of where lights that move are in the middle of it.
+  /// Requires: !empty(). Light is chosen for `receiver` and sampled from `position`, where it is at `time` of the
+  /// shutter; chances are those of where lights that move are in the middle of it.
   LightSample sample(const Vec3& position, const LightReceiver& receiver, const LightRandom& random,
                      float time = 0.5f) const;
 

@@ -36,7 +36,7 @@ class Poser {
 
   /// Gives every mesh that is shown its weights and joints.
   Status pose_meshes() {
-    SHOAL_RETURN_IF_ERROR(pose_skins());
+    if (!document_.skins.empty()) find_joints();
     std::vector<uint32_t> stack(document_.roots.rbegin(), document_.roots.rend());  // in scene order
     while (!stack.empty()) {
       const uint32_t node = stack.back();
@@ -70,14 +70,13 @@ class Poser {
     }
   }
 
-  Status pose_skins() {
-    if (document_.skins.empty()) return {};
-    find_joints();
-    for (uint32_t s = 0; s < document_.skins.size(); ++s) {
-      SHOAL_ASSIGN_OR_RETURN(auto matrices, joint_matrices(s));
-      skins_.push_back(std::move(matrices));
-    }
-    return {};
+  /// Made when the first node that is shown asks for it: others may be compressed still.
+  Result<std::shared_ptr<const gltf::JointMatrices>> posed_skin(uint32_t s) {
+    const auto known = skins_.find(s);
+    if (known != skins_.end()) return known->second;
+    SHOAL_ASSIGN_OR_RETURN(auto matrices, joint_matrices(s));
+    skins_.emplace(s, matrices);
+    return matrices;
   }
 
   Result<std::shared_ptr<const gltf::JointMatrices>> joint_matrices(uint32_t s) {
@@ -133,31 +132,40 @@ class Poser {
     if (node.skin && document_.instancings.contains(index)) {
       warnings_.push_back(fmt::format("nodes[{}] is instanced: its skin is left out", index));
     } else if (node.skin) {
-      joints = skins_[*node.skin];
+      SHOAL_ASSIGN_OR_RETURN(joints, posed_skin(*node.skin));
     }
-    if (!users_.contains(m)) {
-      users_.insert(m);
-      rest_weights_.emplace(m, document_.meshes[m].weights);
-      document_.meshes[m].weights = std::move(weights);
-      document_.meshes[m].joints = std::move(joints);
-      return {};
-    }
-    const gltf::Mesh& shown = document_.meshes[m];
+    const bool first = users_.insert(m).second;
+    const uint32_t posed = first ? m : static_cast<uint32_t>(document_.meshes.size());
     // What goes by its joints lies in world space, so it is not shared even where it is the same.
-    if (!joints && !shown.joints && weights == shown.weights) return {};
-    gltf::Mesh copy = shown;
-    copy.weights = std::move(weights);
-    copy.joints = std::move(joints);
-    node.mesh = static_cast<uint32_t>(document_.meshes.size());
-    document_.meshes.push_back(std::move(copy));
+    if (!joints) {
+      const auto [known, added] = unskinned_.try_emplace({m, without_last_zeros(weights)}, posed);
+      node.mesh = known->second;
+      if (!added) return {};
+    }
+    if (first) {
+      rest_weights_.emplace(m, document_.meshes[m].weights);
+    } else {
+      gltf::Mesh copy = document_.meshes[m];
+      document_.meshes.push_back(std::move(copy));
+    }
+    node.mesh = posed;
+    document_.meshes[posed].weights = std::move(weights);
+    document_.meshes[posed].joints = std::move(joints);
     return {};
+  }
+
+  /// A target that has no weight is one of weight 0.
+  static std::vector<double> without_last_zeros(std::vector<double> weights) {
+    while (!weights.empty() && weights.back() == 0) weights.pop_back();
+    return weights;
   }
 
   gltf::BufferFiles& files_;
   gltf::Document& document_;
   std::vector<std::string>& warnings_;
   std::map<uint32_t, AffineDouble> worlds_;  // of joints
-  std::vector<std::shared_ptr<const gltf::JointMatrices>> skins_;
+  std::map<uint32_t, std::shared_ptr<const gltf::JointMatrices>> skins_;
+  std::map<std::pair<uint32_t, std::vector<double>>, uint32_t> unskinned_;  // the mesh in each pose, by its weights
   std::set<uint32_t> users_;                              // meshes that a node shows
   std::map<uint32_t, std::vector<double>> rest_weights_;  // of those, as the document has them
 };
@@ -210,6 +218,7 @@ Result<std::optional<ChosenPose>> choose_pose(const gltf::Document& document, co
     }
   }
   pose.name = animations[pose.animation].name;
+  if (!animations[pose.animation].broken.empty()) return Error{ErrorCode::kInput, animations[pose.animation].broken};
   return std::optional<ChosenPose>(std::move(pose));
 }
 

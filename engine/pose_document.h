@@ -38,7 +38,8 @@ struct ChosenPose {
   double middle() const { return 0.5 * open + 0.5 * close; }
 };
 
-/// Nothing: nodes at rest. Fails with: kUsage (no such animation, or none at all; a time that is not finite).
+/// Nothing: nodes at rest. Fails with: kUsage (no such animation, or none at all; a time that is not finite), kInput
+/// (the animation is broken).
 Result<std::optional<ChosenPose>> choose_pose(const gltf::Document& document, const PoseOptions& options);
 
 /// Of a document that is not posed yet: matrices of joints, and the meshes that are shown in several poses, at most.

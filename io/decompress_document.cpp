@@ -41,19 +41,22 @@ class PartFinder {
     std::vector<uint32_t> stack = document_.roots;
     std::set<uint32_t> seen;
     while (!stack.empty()) {
-      const Node& node = document_.nodes[stack.back()];
+      const uint32_t index = stack.back();
+      const Node& node = document_.nodes[index];
       stack.pop_back();
       stack.insert(stack.end(), node.children.begin(), node.children.end());
       if (node.mesh && seen.insert(*node.mesh).second) add_mesh(*node.mesh);
-      if (node.mesh && node.skin) add(document_.skins[*node.skin].inverse_bind);
+      const auto instancing = document_.instancings.find(index);
+      if (instancing != document_.instancings.end()) {
+        add_instancing(instancing->second);
+      } else if (node.mesh && node.skin) {
+        add(document_.skins[*node.skin].inverse_bind);
+      }
     }
     if (animation) {
       for (const AnimationChannel& channel : document_.animations[*animation].channels) {
         add(channel.input), add(channel.output);
       }
-    }
-    for (const auto& [node, instancing] : document_.instancings) {
-      for (const auto& accessor : {instancing.translation, instancing.rotation, instancing.scale}) add(accessor);
     }
     return std::move(parts_);
   }
@@ -67,6 +70,9 @@ class PartFinder {
     const Accessor& accessor = document_.accessors[*index];
     if (accessor.view) add_view(*accessor.view);
     if (accessor.sparse) add_view(accessor.sparse->indices_view), add_view(accessor.sparse->values_view);
+  }
+  void add_instancing(const Instancing& instancing) {
+    for (const auto& accessor : {instancing.translation, instancing.rotation, instancing.scale}) add(accessor);
   }
   void add_mesh(uint32_t mesh) {
     const std::vector<Primitive>& primitives = document_.meshes[mesh].primitives;

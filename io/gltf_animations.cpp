@@ -76,7 +76,19 @@ std::optional<AnimatedPath> read_path(const JsonNode& target) {
   return std::nullopt;
 }
 
-void read_animation(const JsonNode& node, const Limits& limits, Document& document, Animation& animation) {
+/// Animated nodes are moved by their parts, which glTF wants them to have instead of a matrix (section 3.5.3).
+void read_rest_place(const JsonNode& node, RestPlace& place) {
+  if (node.member("matrix").present()) {
+    node.fail_at("matrix", "translation, rotation and scale of an animated node", "one");
+  }
+  place.translation = node.numbers<3>("translation", place.translation);
+  place.rotation = node.numbers<4>("rotation", place.rotation);
+  place.scale = node.numbers<3>("scale", place.scale);
+}
+
+/// `nodes`: of the document.
+void read_animation(const JsonNode& node, const JsonNode& nodes, const Limits& limits, Document& document,
+                    Animation& animation) {
   animation.name = node.text("name");
   const JsonNode channels = node.array("channels", limits.objects_count);
   const JsonNode samplers = node.array("samplers", limits.objects_count);
@@ -91,17 +103,19 @@ void read_animation(const JsonNode& node, const Limits& limits, Document& docume
     channel.sampler = channels.object_at(i).required_index("sampler", samplers.size());
     if (node.failed()) return;
     read_sampler(samplers.object_at(channel.sampler), document, channel);
-    if (channel.path != AnimatedPath::kWeights) document.rest_places.try_emplace(channel.node);
+    if (channel.path != AnimatedPath::kWeights) {
+      read_rest_place(nodes.object_at(channel.node), document.rest_places[channel.node]);
+    }
     animation.channels.push_back(channel);
   }
 }
 
-/// Animated nodes are moved by their parts, which glTF wants them to have instead of a matrix (section 3.5.3).
-void read_rest_place(const JsonNode& node, RestPlace& place) {
-  if (node.member("matrix").present()) node.fail_at("matrix", "translation, rotation and scale of an animated node", "one");
-  place.translation = node.numbers<3>("translation", place.translation);
-  place.rotation = node.numbers<4>("rotation", place.rotation);
-  place.scale = node.numbers<3>("scale", place.scale);
+/// A broken one is no reason to refuse a scene that is to stand still.
+void set_aside(const JsonNode& node, Document& document, uint64_t index) {
+  Animation& animation = document.animations[index];
+  animation.channels.clear();
+  animation.broken = node.take_error().message;
+  document.warnings.push_back(fmt::format("animations[{}] cannot be shown: {}", index, animation.broken));
 }
 
 }  // namespace
@@ -113,14 +127,13 @@ void read_skins_and_animations(const JsonNode& root, const Limits& limits, Docum
     read_skin(skins.object_at(i), limits, document, document.skins[i]);
   }
   const JsonNode animations = root.array("animations", limits.objects_count);
-  document.animations.resize(animations.size());
-  for (uint64_t i = 0; i < animations.size() && !root.failed(); ++i) {
-    read_animation(animations.object_at(i), limits, document, document.animations[i]);
-  }
   const JsonNode nodes = root.array("nodes", limits.objects_count);
-  for (auto& [index, place] : document.rest_places) {
-    if (root.failed()) return;
-    read_rest_place(nodes.object_at(index), place);
+  if (root.failed()) return;
+  document.animations.resize(animations.size());
+  for (uint64_t i = 0; i < animations.size(); ++i) {
+    const JsonNode animation = animations.object_at(i);
+    if (!root.failed()) read_animation(animation, nodes, limits, document, document.animations[i]);
+    if (root.failed()) set_aside(root, document, i);
   }
 }
 

@@ -150,6 +150,7 @@ struct AnimationChannel {
 };
 struct Animation {
   std::string name;
+  std::string broken;  ///< why it cannot be shown, with its place; empty: it can
   std::vector<AnimationChannel> channels;
 };
 

@@ -278,6 +278,13 @@ void JsonNode::warn_at(const char* name, const std::string& message) const {
 
 bool JsonNode::failed() const { return state_->error.has_value(); }
 
+Error JsonNode::take_error() const {
+  SHOAL_CHECK(failed());
+  Error error = std::move(*state_->error);
+  state_->error.reset();
+  return error;
+}
+
 JsonText::JsonText(std::unique_ptr<JsonState> state) : state_(std::move(state)) {}
 JsonText::JsonText(JsonText&&) noexcept = default;
 JsonText& JsonText::operator=(JsonText&&) noexcept = default;

@@ -79,6 +79,8 @@ class JsonNode {
   void fail_at(const char* name, const std::string& expected, const std::string& found) const;
   void warn_at(const char* name, const std::string& message) const;
   bool failed() const;
+  /// The error so far, which the text forgets: of a part that can be done without. Requires: failed().
+  Error take_error() const;
 
  private:
   friend class JsonText;

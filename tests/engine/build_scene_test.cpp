@@ -3,6 +3,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "engine/object_ids.h"
 #include "tests/engine/built_scene.h"
 
 namespace shoal::testing {
@@ -159,6 +160,31 @@ TEST(BuildScene, CountsDegenerateTrianglesOfAStripInTheIds) {
   ASSERT_EQ(built.objects[0].size(), 4u);
   const uint32_t ids[4] = {0, 1, 4, 5};
   for (int i = 0; i < 4; ++i) EXPECT_EQ(built.objects[0][i].primitive, ids[i]);
+}
+
+TEST(BuildScene, AWorldOfDegenerateTrianglesIsNoObject) {
+  MemoryFileSystem fs;
+  WrittenScene scene;
+  scene.add_node({{"mesh", scene.add_triangle_mesh(0, 0)}});  // corners that are one point
+  scene.add_node({{"mesh", scene.add_triangle_mesh(1, 0)}});
+  const uint32_t shared = scene.add_triangle_mesh(2, 1);
+  for (const float y : {0.0f, 5.0f}) scene.add_node({{"mesh", shared}, {"translation", {0, y, 0}}});
+  scene.save(fs);
+  const BuiltScene built = build_and_open(fs);
+  EXPECT_EQ(built.report.degenerate_count, 2u);
+  EXPECT_EQ(built.report.triangles_count, 1u);
+  EXPECT_EQ(built.report.instanced_triangles_count, 2u);
+  EXPECT_EQ(built.report.objects_count, 1u);
+  EXPECT_EQ(built.report.instances_count, 2u);
+  EXPECT_EQ(built.scene.top_tree.instance(0).object, 0u);
+  EXPECT_EQ(built.objects[0].size(), 1u);
+  auto ids = ObjectIds::read(*built.scene.file);
+  ASSERT_TRUE(ids.ok());
+  Hit hit;
+  for (hit.instance = 0; hit.instance < 2; ++hit.instance) {
+    hit.primitive = built.objects[0][0].primitive;
+    EXPECT_EQ(ids.value().of(hit), hit.instance + 1);
+  }
 }
 
 TEST(BuildScene, CarriesNothingThatTheMaterialsDoNotCallFor) {

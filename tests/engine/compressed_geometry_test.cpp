@@ -309,6 +309,32 @@ TEST(GpuInstancing, ReadsPlacesThatAreCompressed) {
   EXPECT_EQ(built.scene.top_tree.instance(2).object_to_world.translation.z, 3.0f);
 }
 
+TEST(CompressedGeometry, SkinsAndPlacesThatTheSceneDoesNotShowAreNotDecoded) {
+  const auto saved = [](MemoryFileSystem& fs, bool shown, bool skinned) {
+    PackedScene scene;
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    scene.add_accessor(scene.add_view({reinterpret_cast<const char*>(corners), sizeof corners}), "VEC3", 5126, 3);
+    const std::string junk(100, '\7');
+    scene.add_accessor(scene.add_packed_view(junk, 1, 64, "ATTRIBUTES"), "MAT4", 5126, 1);
+    scene.add_accessor(scene.add_packed_view(junk, 1, 12, "ATTRIBUTES"), "VEC3", 5126, 1);
+    scene.json["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}};
+    scene.json["skins"] = {{{"joints", {0}}, {"inverseBindMatrices", 1}}};
+    Json node = {{"mesh", 0}};
+    if (skinned) node["skin"] = 0;
+    if (!skinned) node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", 2}};
+    scene.json["nodes"].push_back(node);
+    if (shown) scene.json["scenes"][0]["nodes"].push_back(1);
+    scene.save(fs);
+  };
+  for (const bool skinned : {true, false}) {
+    MemoryFileSystem fs;
+    saved(fs, false, skinned);
+    EXPECT_EQ(build_and_open(fs).report.triangles_count, 1u);
+    saved(fs, true, skinned);
+    EXPECT_THAT(build_error(fs, ErrorCode::kInput), HasSubstr("EXT_meshopt_compression"));
+  }
+}
+
 TEST(GpuInstancing, MoreInstancesThanMemoryAreRefusedBeforeTheyAreListed) {
   MemoryFileSystem fs;
   WrittenScene scene;

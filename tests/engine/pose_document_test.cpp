@@ -148,6 +148,21 @@ TEST(Animation, ATimeForASceneWithoutAnimationIsRefused) {
   EXPECT_THAT(build_error(fs, ErrorCode::kUsage, at_time(1)), HasSubstr("the scene has no animation"));
 }
 
+TEST(Animation, ABrokenOneRefusesNobodyButWhoAsksForIt) {
+  MovingTriangle moving("translation", 3, {0}, {1, 0, 0}, "STEP");
+  Json& animations = moving.scene.json["animations"];
+  animations.push_back(animations[0]);
+  animations[1]["name"] = "broken";
+  animations[1]["samplers"][0]["input"] = 999;
+  MemoryFileSystem fs;
+  moving.scene.save(fs);
+  const BuiltScene rest = build_and_open(fs, {});
+  ASSERT_EQ(rest.report.warnings.size(), 1u);
+  EXPECT_THAT(rest.report.warnings[0], HasSubstr("animations[1] cannot be shown: "));
+  expect_corner(build_and_open(fs, at_time(0)), 0, {1, 0, 0}, 0);
+  EXPECT_THAT(build_error(fs, ErrorCode::kInput, at_time(0, "broken")), HasSubstr("animations[1].samplers[0].input"));
+}
+
 TEST(Animation, DataThatCannotBeMeantIsNamedWithItsPlace) {
   const float nan = std::nanf("");
   const auto error = [](const char* path, uint32_t width, const std::vector<float>& times,
@@ -214,6 +229,25 @@ TEST(MorphTargets, TheWeightsOfANodeReplaceThoseOfItsMeshAndEachPoseIsAMesh) {
   EXPECT_EQ(built.objects[0][0].position[2], 0.0f);
   EXPECT_EQ(built.objects[0][0].position[1], 5.0f);
   EXPECT_EQ(built.objects[1][0].position[2], 1.0f);
+}
+
+TEST(MorphTargets, NodesWithTheSameWeightsShareAMesh) {
+  MemoryFileSystem fs;
+  MorphedTriangle morphed;
+  for (int i = 0; i < 6; ++i) {
+    Json node = {{"mesh", 0}, {"translation", {0, i, 0}}};
+    if (i % 3 != 0) node["weights"] = {i % 3, 0.5 * (i % 3 - 1)};  // none and twice (1, 0) and (2, 0.5)
+    morphed.scene.add_node(node);
+  }
+  morphed.scene.add_node({{"mesh", 0}, {"translation", {0, 6, 0}}, {"weights", {0, 0}}});
+  morphed.scene.save(fs);
+  const BuiltScene built = build_and_open(fs);
+  EXPECT_EQ(built.report.objects_count, 3u);
+  EXPECT_EQ(built.report.instances_count, 7u);
+  EXPECT_EQ(built.report.triangles_count, 3u);
+  EXPECT_EQ(built.objects[0][0].position[2], 0.0f);
+  EXPECT_EQ(built.objects[1][0].position[2], 1.0f);
+  EXPECT_EQ(built.objects[2][0].position[2], 2.0f);
 }
 
 TEST(MorphTargets, WeightsAreAnimated) {

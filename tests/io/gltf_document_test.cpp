@@ -239,7 +239,28 @@ TEST(GltfDocument, RefusesMotionOfTheWrongShape) {
   EXPECT_THAT(broken("/meshes/0/weights", {1, 2}), HasSubstr("meshes[0].weights: expected 1, one a morph target"));
   EXPECT_THAT(broken("/meshes/0/weights/0", "x"), HasSubstr("meshes[0].weights[0]"));
   EXPECT_THAT(broken("/meshes/0/primitives/0/targets/0/POSITION", 3), HasSubstr("targets[0].POSITION: expected 3"));
+}
+
+TEST(GltfDocument, SetsAnimationsOfTheWrongShapeAside) {
+  const auto broken = [](const std::string& pointer, const json& value) {
+    GltfScene scene = triangle_scene();
+    scene.add_accessor<float>({0, 1}, "SCALAR", kFloat, 2);
+    scene.add_accessor<float>({0, 0, 0, 1, 1, 1}, "VEC3", kFloat, 2);
+    const json whole = {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+                        {"samplers", {{{"input", 3}, {"output", 4}}}}};
+    scene.root["animations"] = {whole, whole};
+    scene.root["animations"][0]["channels"][0]["target"]["node"] = 1;
+    scene.root[json::json_pointer(pointer)] = value;
+    const Document document = load(scene);
+    EXPECT_EQ(document.animations.at(1).broken, "");
+    EXPECT_EQ(document.animations.at(1).channels.size(), 1u);
+    EXPECT_TRUE(document.animations[0].channels.empty());
+    EXPECT_EQ(document.warnings.size(), 1u);
+    EXPECT_THAT(document.warnings.at(0), HasSubstr("animations[0] cannot be shown: "));
+    return document.animations[0].broken;
+  };
   const std::string animation = "/animations/0/";
+  EXPECT_THAT(broken("/animations/0", 3), HasSubstr("animations[0]: expected an object"));
   EXPECT_THAT(broken(animation + "channels/0/sampler", 1), HasSubstr("animations[0].channels[0].sampler"));
   EXPECT_THAT(broken(animation + "channels/0/target/node", 7), HasSubstr("target.node"));
   EXPECT_THAT(broken(animation + "channels/0/target/path", "rotation"), HasSubstr("values of 4 components"));
