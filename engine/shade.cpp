@@ -60,6 +60,13 @@ uint32_t light_side(const Surface& surface, const AnyBsdf& bsdf) {
   return bsdf.transmits() ? 0 : encode_direction(surface.geometric_normal);
 }
 
+/// Where the shadow ray to a light ends, at a time of the shutter.
+BoundedPoint shadow_end(const LightSample& light, const Vec3& origin, float time) {
+  if (light.instance == nullptr || !light.instance->moves()) return ray_end(light.target, origin, light.instance);
+  const Instance now = instance_at(*light.instance, time);
+  return ray_end(light.target, origin, &now);
+}
+
 bool wants_cones(const Scene& scene, const ShadingOptions& options) {
   const uint32_t called = scene.textures.empty() ? 0 : uint32_t{kEffectTextures};
   return (options.effects.of(called) & kEffectTextures) != 0 && options.texture_filter == TextureFilter::kMip;
@@ -215,16 +222,10 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
     return {};
   }
   // The ray ends at t = 1, just before the emitter.
-  const BoundedPoint target = shadow_end(path, light, result.shadow_origin);
+  const BoundedPoint target = shadow_end(light, result.shadow_origin, time_of(path));
   result.shadow_direction = offset_point(target, light.target_normal) - result.shadow_origin;
   result.shadow_t_max = 1;
   return {};
-}
-
-BoundedPoint Shader::shadow_end(const PathState& path, const LightSample& light, const Vec3& origin) const {
-  if (light.instance == nullptr || !light.instance->moves()) return ray_end(light.target, origin, light.instance);
-  const Instance now = instance_at(*light.instance, time_of(path));
-  return ray_end(light.target, origin, &now);
 }
 
 template <class AnyBsdf>

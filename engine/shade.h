@@ -127,7 +127,6 @@ class Shader {
   template <class AnyBsdf>
   Status sample_light(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                       ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters);
-  BoundedPoint shadow_end(const PathState& path, const LightSample& light, const Vec3& origin) const;
   template <class AnyBsdf>
   void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
                      ShadeResult& result) const;
