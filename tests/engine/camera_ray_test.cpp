@@ -91,7 +91,6 @@ TEST(Camera, StandsAtItsKeysAndGoesStraightBetweenThem) {
   expect_near(middle(0).direction, {0, 0, -1});
   expect_near(middle(0.5f).direction, {-0.6f, 0, -0.8f});
   expect_near(middle(0.5f).origin, {4, 0, 0});
-  expect_near(middle(1).origin, {8, 2, 0});
   // Half the way from the first key, however long its axes are.
   expect_near(middle(0.25f).origin, {2, 0, 0});
   expect_near(middle(0.25f).direction, glm::normalize(Vec3(-0.3f, 0, -0.9f)));
