@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "bins/accuracy_page.h"
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
@@ -38,7 +39,7 @@ Result<double> parse_duration(const std::string& text) {
 }
 
 std::vector<std::string> outputs(const Arguments& arguments) {
-  return {arguments.out + "/accuracy.json", arguments.out + "/accuracy.csv"};
+  return {arguments.out + "/accuracy.json", arguments.out + "/accuracy.csv", arguments.out + "/report.html"};
 }
 
 /// What can be said before the scene is read; makes the folder.
@@ -171,7 +172,10 @@ void print_rows(const AccuracyResult& result) {
 Status write_report(const Arguments& arguments, const PreparedRender& prepared, const AccuracyJob& job,
                     const AccuracyResult& result) {
   const std::vector<std::string> paths = outputs(arguments);
-  const std::string texts[] = {accuracy_json(result, prepared.scene, job), accuracy_csv(result)};
+  const std::string json = accuracy_json(result, prepared.scene, job);
+  const std::string name = std::filesystem::path(arguments.render.scene).filename().string();
+  SHOAL_ASSIGN_OR_RETURN(const std::string html, report_html(accuracy_page(result, name, json)));
+  const std::string texts[] = {json, accuracy_csv(result), html};
   for (size_t i = 0; i < paths.size(); ++i) {
     SHOAL_RETURN_IF_ERROR(write_whole_file(posix_file_system(), paths[i], std::as_bytes(std::span(texts[i]))));
   }
@@ -210,7 +214,7 @@ void declare_accuracy(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("accuracy", "what each accuracy knob costs on a scene, and what it brings");
   arguments->render.declare(*sub);
-  sub->add_option("--out", arguments->out, "folder for accuracy.json and accuracy.csv")->required();
+  sub->add_option("--out", arguments->out, "folder for report.html, accuracy.json and accuracy.csv")->required();
   sub->add_option("--budget", arguments->budget,
                   "time for everything, such as 90s, 5m, 1h: lowers --width, --height, --spp and --reference-spp until "
                   "they fit; none: they stay")

@@ -150,14 +150,20 @@ Result<Image8> decode_png(std::span<const std::byte> bytes, const std::string& n
   return image;
 }
 
-Status write_png(FileSystem& fs, const std::string& path, uint32_t width, uint32_t height,
-                 std::span<const uint8_t> rgb) {
+Result<std::vector<std::byte>> encode_png(uint32_t width, uint32_t height, std::span<const uint8_t> rgb) {
   SHOAL_CHECK(rgb.size() == uint64_t{3} * width * height);
   Writer writer;
   if (writer.info == nullptr || !write_pixels(writer, width, height, rgb.data())) {
-    return Error{ErrorCode::kInternal, fmt::format("{}: libpng: {}", path, writer.message.text)};
+    return Error{ErrorCode::kInternal, fmt::format("libpng: {}", writer.message.text)};
   }
-  return write_whole_file(fs, path, writer.bytes);
+  return std::move(writer.bytes);
+}
+
+Status write_png(FileSystem& fs, const std::string& path, uint32_t width, uint32_t height,
+                 std::span<const uint8_t> rgb) {
+  const Result<std::vector<std::byte>> png = encode_png(width, height, rgb);
+  if (!png.ok()) return Error{png.error().code, path + ": " + png.error().message};
+  return write_whole_file(fs, path, png.value());
 }
 
 }  // namespace shoal

@@ -1,0 +1,13 @@
+// Files that report pages are made of, embedded at build time (cmake/shoal_report.cmake). Called by bins/report_page.
+#pragma once
+
+#include <string_view>
+
+namespace shoal {
+
+extern const std::string_view kReportTheme;   ///< bins/report/theme.css
+extern const std::string_view kReportScript;  ///< bins/report/plots.js
+/// The plotting library, uPlot; empty when it could not be fetched.
+extern const std::string_view kPlotStyle, kPlotScript, kPlotLicense;
+
+}  // namespace shoal

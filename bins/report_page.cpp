@@ -1,0 +1,148 @@
+#include "bins/report_page.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "bins/report_assets.h"
+#include "io/base64.h"
+#include "io/png_image.h"
+
+namespace shoal {
+namespace {
+
+constexpr const char* kNoPlots =
+    "This plot needs the library uPlot, which was not at hand when the program was built (npm and a network, then configure "
+    "again). Its numbers are in the table.";
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+/// JSON may hold "</script>" and "<!--" in strings, which would end the element early.
+std::string in_script(const std::string& json) {
+  std::string out;
+  for (const char c : json) {
+    if (c == '<') {
+      out += "\\u003c";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string dump(const nlohmann::ordered_json& json) {
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+/// Fills `html` block by block.
+struct Writer {
+  std::string html;
+  Status status = {};
+
+  void operator()(const ReportText& block) { html += fmt::format("<p>{}</p>\n", escaped(block.text)); }
+
+  void operator()(const ReportList& block) {
+    html += "<ul>\n";
+    for (const std::string& item : block.items) html += fmt::format("<li>{}</li>\n", escaped(item));
+    html += "</ul>\n";
+  }
+
+  void operator()(const ReportTable& block) {
+    html += "<div class=\"scroll\"><table>\n<thead><tr>";
+    for (const std::string& head : block.head) html += fmt::format("<th>{}</th>", escaped(head));
+    html += "</tr></thead>\n<tbody>\n";
+    for (const ReportTable::Row& row : block.rows) {
+      html += row.marked ? "<tr class=\"marked\">" : "<tr>";
+      for (const ReportCell& cell : row.cells) {
+        html += cell.value ? fmt::format("<td data-value=\"{}\">{}</td>", *cell.value, escaped(cell.text))
+                           : fmt::format("<td>{}</td>", escaped(cell.text));
+      }
+      html += "</tr>\n";
+    }
+    html += "</tbody></table></div>\n";
+    if (!block.caption.empty()) html += fmt::format("<p class=\"note\">{}</p>\n", escaped(block.caption));
+  }
+
+  void operator()(const ReportPlot& plot) {
+    nlohmann::ordered_json spec = {{"x", plot.x_label}, {"y", plot.y_label}, {"logX", plot.log_x}, {"logY", plot.log_y}};
+    size_t points = 0;
+    for (const ReportSeries& series : plot.series) {
+      nlohmann::ordered_json one = {{"label", series.label}, {"line", series.line}, {"front", series.front},
+                                    {"x", nlohmann::json::array()}, {"y", nlohmann::json::array()},
+                                    {"names", nlohmann::json::array()}};
+      for (size_t i = 0; i < series.x.size(); ++i) {
+        if ((plot.log_x && !(series.x[i] > 0)) || (plot.log_y && !(series.y[i] > 0))) continue;
+        one["x"].push_back(series.x[i]), one["y"].push_back(series.y[i]), one["names"].push_back(series.names[i]);
+        ++points;
+      }
+      if (!one["x"].empty()) spec["series"].push_back(one);
+    }
+    html += fmt::format("<figure class=\"plot\" data-points=\"{}\"><h3>{}</h3>\n<div class=\"place\">{}</div>\n", points,
+                        escaped(plot.title),
+                        report_has_plots() ? "" : fmt::format("<p class=\"missing\">{}</p>", kNoPlots));
+    html += fmt::format("<script type=\"application/json\">{}</script></figure>\n", in_script(dump(spec)));
+  }
+
+  void operator()(const ReportPictures& block) {
+    html += "<div class=\"gallery\">\n";
+    for (const ReportPictures::Item& item : block.items) {
+      html += "<figure><div class=\"pair\">";
+      for (const std::vector<uint8_t>& rgb : item.rgb) {
+        const Result<std::vector<std::byte>> png = encode_png(block.width, block.height, rgb);
+        if (!png.ok()) {
+          if (status.ok()) status = png.error();
+          continue;
+        }
+        html += fmt::format("<img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">", block.width,
+                            block.height, escaped(item.caption), encode_base64(png.value()));
+      }
+      html += fmt::format("</div><figcaption>{}</figcaption></figure>\n", escaped(item.caption));
+    }
+    html += "</div>\n";
+  }
+};
+
+constexpr const char* kHead = R"(<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+)";
+
+}  // namespace
+
+bool report_has_plots() { return !kPlotScript.empty(); }
+
+Result<std::string> report_html(const ReportPage& page) {
+  Writer writer;
+  std::string& html = writer.html;
+  html += kHead;
+  html += fmt::format("<title>{}</title>\n<style>{}\n{}</style>\n</head>\n<body>\n", escaped(page.title), kPlotStyle,
+                      kReportTheme);
+  html += fmt::format("<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n", escaped(page.title), escaped(page.subtitle));
+  for (const ReportSection& section : page.sections) {
+    html += fmt::format("<section>\n<h2>{}</h2>\n", escaped(section.heading));
+    for (const auto& block : section.blocks) std::visit(writer, block);
+    html += "</section>\n";
+  }
+  SHOAL_RETURN_IF_ERROR(writer.status);
+  html += fmt::format("<script type=\"application/json\" id=\"data\">{}</script>\n", in_script(page.data_json));
+  if (report_has_plots()) html += fmt::format("<script>/*\n{}*/\n{}</script>\n", kPlotLicense, kPlotScript);
+  html += fmt::format("<script>\n{}</script>\n</body>\n</html>\n", kReportScript);
+  return std::move(writer.html);
+}
+
+}  // namespace shoal
