@@ -92,7 +92,8 @@ ReportSection knob_section(const AccuracyResult& result, const std::vector<Accur
   ReportSection section{"What a step costs", {}};
   for (size_t i = 0; i < result.knobs.size(); ++i) {
     const AccuracyKnob& knob = result.knobs[i];
-    section.blocks.emplace_back(ReportText{fmt::format("{} (base: {}). {}", knob.name, result.base().settings[i], knob.sentence)});
+    section.blocks.emplace_back(ReportHeading{fmt::format("{} (base: {})", knob.name, result.base().settings[i])});
+    section.blocks.emplace_back(ReportText{knob.sentence});
     ReportList steps;
     for (const AccuracySentence& sentence : sentences) {
       if (sentence.knob == knob.name) steps.items.push_back(sentence.text);

@@ -51,6 +51,7 @@ struct Writer {
   std::string html;
   Status status = {};
 
+  void operator()(const ReportHeading& block) { html += fmt::format("<h3>{}</h3>\n", escaped(block.text)); }
   void operator()(const ReportText& block) { html += fmt::format("<p>{}</p>\n", escaped(block.text)); }
 
   void operator()(const ReportList& block) {

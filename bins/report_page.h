@@ -15,6 +15,11 @@
 
 namespace shoal {
 
+/// Below the heading of a section.
+struct ReportHeading {
+  std::string text;
+};
+
 struct ReportText {
   std::string text;
 };
@@ -62,7 +67,7 @@ struct ReportPictures {
 
 struct ReportSection {
   std::string heading;
-  std::vector<std::variant<ReportText, ReportList, ReportTable, ReportPlot, ReportPictures>> blocks;
+  std::vector<std::variant<ReportHeading, ReportText, ReportList, ReportTable, ReportPlot, ReportPictures>> blocks;
 };
 
 struct ReportPage {

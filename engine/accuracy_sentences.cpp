@@ -102,8 +102,9 @@ std::string summary(const AccuracyResult& result) {
   text += fmt::format(" The base takes {} and has a relMSE of {} and a FLIP of {}.", seconds(base.seconds),
                       number(base.rel_mse), number(base.flip));
   text += closest == &base ? std::string(" Nothing that was tried is closer in its time.")
-                           : fmt::format(" Closest in at most its time: {}, {} and a relMSE of {}.", closest->name,
-                                         seconds(closest->seconds), number(closest->rel_mse));
+                           : fmt::format(" Closest in at most its time: {}, {}, relMSE {}, FLIP {}{}.", closest->name,
+                                         seconds(closest->seconds), number(closest->rel_mse), number(closest->flip),
+                                         closest->error.biased ? ", biased by " + percent(closest->bias()) : "");
   return text;
 }
 
