@@ -309,15 +309,16 @@ class TouchingTracer {
 
   /// What find_candidates() reads.
   HWY_INLINE void touch_leaf(const LeafView& leaf) {
-    const bool floats = leaf.has_floats();
+    const bool floats = leaf.has_floats(), grid = leaf.has_grid();
     meter_.read(leaf.leaf, floats ? sizeof(LeafHeader) : LeafParts::kLow, DataKind::kLeaves);
     for (size_t first = 0; first < leaf.vertex_count; first += kLeafLanes) {
       for (uint32_t axis = 0; axis < 3; ++axis) {
         if (floats) {
           meter_.read(leaf.floats(axis) + first, 4 * kLeafLanes, DataKind::kLeaves);
         } else {
-          meter_.read(leaf.low(axis) + first, 2 * kLeafLanes, DataKind::kLeaves);
-          meter_.read(leaf.high(axis) + first, kLeafLanes, DataKind::kLeaves);
+          if (grid) meter_.read(leaf.grid_low(axis) + first, kLeafLanes, DataKind::kLeaves);
+          if (!grid) meter_.read(leaf.low(axis) + first, 2 * kLeafLanes, DataKind::kLeaves);
+          meter_.read((grid ? leaf.grid_high(axis) : leaf.high(axis)) + first, kLeafLanes, DataKind::kLeaves);
         }
       }
     }

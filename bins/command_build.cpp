@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "bins/command.h"
+#include "bins/positions_option.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
 
@@ -15,6 +16,7 @@ struct BuildArguments {
   unsigned threads = 0;
   bool consume = false;
   PoseOptions pose;
+  std::optional<PositionPrecision> positions;
 };
 
 Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console) {
@@ -30,6 +32,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   options.scratch_folder = arguments.scratch_folder;
   options.consume = arguments.consume;
   options.variant = arguments.variant;
+  options.positions = arguments.positions.value_or(PositionPrecision::kExact);
   options.pose = arguments.pose;
   options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
@@ -53,6 +56,10 @@ int run_build(const BuildArguments& arguments, Console& console) {
     console.info(fmt::format("built out of core in {} chunks, {} through the scratch file", r.chunks_count,
                              format_bytes(r.scratch_written_bytes)));
   }
+  if (r.position_step > 0) {
+    console.info(fmt::format("positions in steps of up to {:g}: no point moved by more than {:g} in space", r.position_step,
+                             r.position_error));
+  }
   if (arguments.consume) console.info(fmt::format("{} of the source given back", format_bytes(r.consumed_bytes)));
   if (r.degenerate_count > 0) console.info(fmt::format("{} degenerate triangles skipped", r.degenerate_count));
   return 0;
@@ -70,6 +77,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--scratch", arguments->scratch_folder,
                   "folder for what does not fit in memory: 40 bytes a triangle and 12 for each float of a corner's "
                   "attributes (default: that of the output)");
+  declare_positions(*sub, arguments->positions);
   sub->add_option("--variant", arguments->variant, kVariantHelp);
   sub->add_flag("--consume", arguments->consume,
                 "DESTROYS the source: gives the disk space of its .bin parts back while they are read, even if the build "

@@ -14,6 +14,7 @@
 
 #include "bins/choice_option.h"
 #include "bins/lens_options.h"
+#include "bins/positions_option.h"
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
 #include "engine/source_files.h"
@@ -230,6 +231,7 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
   declare_lens(app, picture);
   declare_pose(app, pose);
+  declare_positions(app, positions);
   app.add_option("--environment", environment, "constant:R,G,B or an equirectangular F.hdr or F.exr");
   app.add_option("--environment-rotation", picture.shading.environment.rotation,
                  "degrees by which the environment is turned, counter-clockwise seen from above")
@@ -328,6 +330,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   build.threads = arguments.execution.threads;
   build.scratch_folder = arguments.scratch_folder;
   build.pose = arguments.pose;
+  build.positions = arguments.positions.value_or(PositionPrecision::kExact);
   build.max_memory_bytes = prepared.execution.max_memory_bytes;
   if (!arguments.treelet_size.empty()) {
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
@@ -344,7 +347,10 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   std::unique_ptr<PageFile> file = std::move(opened).value();
   SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, pictures_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
-  if (is_shoal_file(arguments.scene)) SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
+  if (is_shoal_file(arguments.scene)) {
+    SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
+    SHOAL_RETURN_IF_ERROR(check_positions(prepared.scene, arguments.positions));
+  }
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));
   }

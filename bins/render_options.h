@@ -46,6 +46,7 @@ void declare_pose(CLI::App& app, PoseOptions& pose);
 struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder, variant, effects;
   PoseOptions pose;
+  std::optional<PositionPrecision> positions;  ///< none: exact, or those of the .shoal
   PictureOptions picture;
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false, discard_built = false;

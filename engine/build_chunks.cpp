@@ -1,6 +1,8 @@
 #include "engine/build_chunks.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include <future>
 
@@ -21,7 +23,12 @@ class GatherPass : public BlockTaker {
   GatherPass(TriangleSoup& soup, const ObjectBuildInput& input, ObjectBuildOutput& output)
       : soup_(soup), input_(input), output_(output) {}
 
+  void prepare(StreamBlock& block) const override {
+    block.corners = {};
+    if (input_.positions != PositionPrecision::kExact) include_corners(block.triangles.soup.positions, block.corners);
+  }
   Status take(StreamBlock& block) override {
+    corners_.include(block.corners);
     const TriangleSoup& from = block.triangles.soup;
     soup_.positions.insert(soup_.positions.end(), from.positions.begin(), from.positions.end());
     soup_.primitive.insert(soup_.primitive.end(), from.primitive.begin(), from.primitive.end());
@@ -35,11 +42,22 @@ class GatherPass : public BlockTaker {
   Status source_done(const PrimitiveSource& source) override {
     return input_.source_done ? input_.source_done(source) : Status();
   }
+  /// Once all are there.
+  void round() {
+    const PositionGrid grid = output_.grid = PositionGrid::of(input_.positions, corners_);
+    soup_.position_step = grid.step;
+    if (grid.step == 0) return;
+    const std::span<float> all = soup_.positions;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, all.size(), 1u << 16),
+                      [&](const auto& range) { grid.round(all.subspan(range.begin(), range.size())); });
+    for (Emitter& emitter : output_.emitters) grid.round(emitter.position);
+  }
 
  private:
   TriangleSoup& soup_;
   const ObjectBuildInput& input_;
   ObjectBuildOutput& output_;
+  Bounds3 corners_;
 };
 
 /// Parts of `run` triangles in order, halved by count.
@@ -95,8 +113,12 @@ class ChunkBuilder {
       return TrianglesDone([this, first, stage](uint64_t n) { input_.progress(stage, first ? n : 0); });
     };
     const TrianglesDone measured = done("measuring"), counted = done("counting"), sorted = done("sorting");
-    MeasurePass measure(measured);
+    MeasurePass measure(first && input_.positions != PositionPrecision::kExact, measured);
     SHOAL_RETURN_IF_ERROR(source.stream(false, measure));
+    if constexpr (std::is_same_v<Source, ObjectSource>) {
+      output_.grid = PositionGrid::of(input_.positions, measure.corners());
+      source.round_to(output_.grid);
+    }
     ChunkGrid grid(measure.centroids(), input_.memory.grid_cells(triangles));
     CountPass count(grid, counted);
     SHOAL_RETURN_IF_ERROR(source.stream(false, count));
@@ -177,6 +199,7 @@ class ChunkBuilder {
     SHOAL_RETURN_IF_ERROR(check_stop(input_.stop, input_.path));
     SHOAL_ASSIGN_OR_RETURN(const auto bytes, raw_.reserve(chunk_bytes(extent)));
     soup.layout = layout_;
+    soup.position_step = output_.grid.step;
     decode_records(bytes.first(extent.records * record_bytes(layout_)), materials_, soup);
     std::vector<uint32_t> part_of;
     const uint32_t parts = chunk.last_part - chunk.first_part;
@@ -231,6 +254,7 @@ Result<ObjectBuildOutput> build_at_once(ObjectSource& source, uint64_t triangles
   GatherPass gather(soup, input, output);
   SHOAL_RETURN_IF_ERROR(source.stream(true, gather));
   SHOAL_RETURN_IF_ERROR(check_stop(input.stop, input.path));
+  gather.round();
   if (soup.size() > 0) {
     SHOAL_ASSIGN_OR_RETURN(output.object, build_object(std::move(soup), input.treelets, &input.coverage, input.sink));
   }

@@ -25,6 +25,7 @@ struct ObjectBuildInput {
   std::string scratch_folder;
   const std::atomic<bool>* stop;
   BuildOptions treelets;
+  PositionPrecision positions;
   const BuildMemoryPlan& memory;
   const CoverageSource& coverage;
   const std::vector<Material>& materials;
@@ -40,6 +41,7 @@ struct ObjectBuildOutput {
   std::vector<Emitter> emitters;  ///< object space, in order of primitive
   uint64_t degenerate_count = 0;  ///< left out while reading; object.degenerate_count counts others
   uint64_t chunks_count = 0;      ///< 0: it was built at once
+  PositionGrid grid;              ///< that its positions were rounded to
   uint64_t scratch_written_bytes = 0, scratch_read_bytes = 0;
 };
 

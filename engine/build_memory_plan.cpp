@@ -97,7 +97,7 @@ bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t c
   plan.threads =
       static_cast<unsigned>(std::clamp<uint64_t>(threads_share / kThreadBytes, 1, std::max(1u, needs.threads)));
   plan.threads_bytes = plan.threads * kThreadBytes;
-  const uint64_t page = page_in_flight_bytes(needs.treelet_bytes, largest.layout);
+  const uint64_t page = page_in_flight_bytes(needs.treelet_bytes, largest.layout, needs.positions_on_grid);
   const uint64_t pages_share = std::max(2 * page, left / 8);
   const uint64_t lane = ObjectSource::lane_bytes(largest.layout, needs.pose_windows);
   const uint64_t lanes_share = std::max(lane, left / 4);

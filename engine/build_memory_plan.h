@@ -29,6 +29,7 @@ struct BuildMemoryNeeds {
   uint64_t pose_bytes = 0;               ///< pose_bytes(): resident while building
   uint32_t pose_windows = 0;             ///< of the primitive that is morphed or skinned by most accessors
   uint32_t treelet_bytes = 0;
+  bool positions_on_grid = false;        ///< --positions other than exact
   unsigned threads = 1;
   uint64_t forced_chunk_triangles = 0;   ///< 0: from the plan
 };

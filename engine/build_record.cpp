@@ -44,6 +44,7 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
   SHOAL_RETURN_IF_ERROR(sources.add_parts(document));
   SourceHash hash(source_hash(sources, true));
   hash.add(options.treelet_bytes);
+  hash.add(static_cast<uint64_t>(options.positions));
   SHOAL_ASSIGN_OR_RETURN(const auto pose, choose_pose(document, options.pose));
   if (pose) hash.add(pose->animation), hash.add(std::bit_cast<uint64_t>(pose->time + 0.0));
   if (pose && pose->has_shutter()) {
@@ -63,7 +64,8 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
   json["scene_version"] = header.version;
   json["source"] = std::filesystem::path(document.path).filename().string();
   json["content_hash"] = fmt::format("{:016x}", header.content_hash);
-  json["options"] = {{"treelet_bytes", header.treelet_bytes}};
+  json["options"] = {{"treelet_bytes", header.treelet_bytes},
+                     {"positions", position_precision_name(static_cast<PositionPrecision>(header.position_bits))}};
   if (!variant.empty()) json["options"]["variant"] = variant;
   if (pose) {
     json["options"]["animation"] = pose->animation;
@@ -77,6 +79,8 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
   json["objects_count"] = report.objects_count;
   json["instances_count"] = report.instances_count;
   json["treelets_count"] = report.treelets_count;
+  json["position_step"] = header.position_step;
+  json["position_error"] = header.position_error;
   json["sah_cost"] = report.sah_cost;
   json["warnings"] = report.warnings;
   return dump(json);

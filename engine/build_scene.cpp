@@ -164,6 +164,7 @@ class SceneBuilder {
     }
     needs.instances += (motion_.meshes.size() + motion_.cameras.size()) * motion_.key_count;
     needs.treelet_bytes = options_.treelet_bytes;
+    needs.positions_on_grid = options_.positions != PositionPrecision::kExact;
     needs.threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
     needs.forced_chunk_triangles = options_.chunk_triangles;
     SHOAL_ASSIGN_OR_RETURN(memory_, plan_build_memory(needs, cap_bytes(), path_));
@@ -200,7 +201,7 @@ class SceneBuilder {
     const StreamInput stream{fs_, document_, flat_, geometry_, materials_, options_.stop, memory_.lanes};
     const ObjectBuildInput input{
         fs_, path_, scratch_folder_, options_.stop, {options_.treelet_bytes, memory_.pages_in_flight},
-        memory_, coverage, materials_.materials, sink,
+        options_.positions, memory_, coverage, materials_.materials, sink,
         [this](const char* stage, uint64_t triangles) { count_progress(stage, triangles); },
         [this](const PrimitiveSource& source) { return consumer_ ? consumer_->source_done(source) : Status(); }};
     for (const ObjectPlan& object : geometry_.objects) SHOAL_RETURN_IF_ERROR(build(object, stream, input));
@@ -226,7 +227,10 @@ class SceneBuilder {
     report_.chunks_count += built.chunks_count;
     report_.scratch_written_bytes += built.scratch_written_bytes;
     report_.scratch_read_bytes += built.scratch_read_bytes;
+    if (built.grid.far_out) far_out_step_ = std::max(far_out_step_, built.grid.step);
+    report_.position_step = std::max(report_.position_step, built.grid.step);
     if (!built.object.nodes.empty()) {
+      steps_.push_back(built.grid.step);
       emitters_of_.push_back(std::move(built.emitters));
       built_.push_back(std::move(built.object));
       built_plans_.push_back(&object);
@@ -261,6 +265,8 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(
         append_emitters(emitters_of_[object], shown, static_cast<uint32_t>(placed_.size()), emitters_));
     report_.instanced_triangles_count += built_[object].triangles_count;
+    report_.position_error =
+        std::max(report_.position_error, farthest_shift(steps_[object], placed->instance.object_to_world));
     placed_.push_back(*placed);
     return {};
   }
@@ -281,6 +287,11 @@ class SceneBuilder {
       return Error{ErrorCode::kInput,
                    fmt::format("{}: expected triangles to draw, found none in the scene", path_)};
     }
+    if (far_out_step_ > 0) {
+      report_.warnings.push_back(fmt::format("positions are rounded to steps of up to {:g}, coarser than {} bits: so far "
+                                             "from the origin floats are hardly finer",
+                                             far_out_step_, position_precision_name(options_.positions)));
+    }
     report_.instances_count = placed_.size();
     report_.objects_count = built_.size();
     return {};
@@ -295,6 +306,9 @@ class SceneBuilder {
     header.degenerate_count = report_.degenerate_count;
     header.texture_bytes = textures_.pages_bytes;
     header.content_hash = source_hash(sources_, false);
+    header.position_bits = static_cast<uint32_t>(options_.positions);
+    header.position_step = report_.position_step;
+    header.position_error = report_.position_error;
     sink.fill(header);
     Bounds3 bounds;
     for (const PlacedInstance& placed : placed_) bounds.include(placed.bounds);
@@ -360,6 +374,8 @@ class SceneBuilder {
   std::vector<BuiltObject> built_;                 // without those that have no triangle left
   std::vector<const ObjectPlan*> built_plans_;     // parallel to built_
   std::vector<std::vector<Emitter>> emitters_of_;  // likewise, object space
+  std::vector<float> steps_;                       // likewise, PositionGrid::step
+  float far_out_step_ = 0;
   std::vector<PlacedInstance> placed_;
   std::vector<Emitter> emitters_;
   std::optional<ChosenPose> pose_;

@@ -11,6 +11,7 @@
 
 #include "engine/build_memory_plan.h"
 #include "engine/pose_document.h"
+#include "engine/position_grid.h"
 #include "io/gltf_document.h"
 #include "io/result.h"
 
@@ -29,6 +30,7 @@ struct SceneBuildOptions {
   /// Gives the space of the source's binary parts back as soon as each was read for the last time. Destroys the source,
   /// also when the build fails or is stopped later on. Not for .glb.
   bool consume = false;
+  PositionPrecision positions = PositionPrecision::kExact;
   PoseOptions pose;               ///< the time that skins, morph targets and nodes are posed at
   uint64_t chunk_triangles = 0;   ///< triangles built at once; 0: from the memory plan (else for tests)
   std::string variant;            ///< KHR_materials_variants, by name; empty: the materials as they are
@@ -45,6 +47,8 @@ struct SceneBuildReport {
   uint64_t chunks_count = 0;  ///< that objects which did not fit were built in
   uint64_t scratch_written_bytes = 0, scratch_read_bytes = 0;
   uint64_t consumed_bytes = 0;  ///< of the source, given back
+  float position_step = 0;   ///< of the coarsest grid that positions were rounded to; 0: none was
+  float position_error = 0;  ///< how far that moved a point at most, in world space
   double sah_cost = 0;
   double seconds = 0;
   std::vector<std::string> warnings;
@@ -56,7 +60,7 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
                                      const SceneBuildOptions& options);
 
 /// What a built scene is kept under: a hash of the JSON, of sizes and modification times of the files it names, of
-/// treelet size, pose, variant and builder version; not of the cap, which changes the tree but never the picture.
+/// treelet size, precision of positions, pose, variant and builder version; not of the cap, which changes the tree but never the picture.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

@@ -9,6 +9,7 @@
 #include "engine/build_record.h"
 #include "engine/dispersion.h"
 #include "engine/mip_pyramid.h"
+#include "engine/position_grid.h"
 #include "engine/tile_textures.h"
 #include "treelets/attribute_layout.h"
 #include "treelets/trace_treelet.h"
@@ -61,6 +62,12 @@ class TableChecker {
       return corrupt(fmt::format("version: expected {}, found {}: build the scene again", kSceneVersion, h.version));
     }
     if (!finite(h.bounds_lo) || !finite(h.bounds_hi)) return corrupt("bounds: expected finite numbers");
+    const auto known = [&](PositionPrecision p) { return h.position_bits == static_cast<uint32_t>(p); };
+    if (std::none_of(std::begin(kPositionPrecisions), std::end(kPositionPrecisions), known) ||
+        !(h.position_step >= 0) || !(h.position_error >= 0)) {
+      return corrupt(fmt::format("precision of positions: found {} bits, a step of {} and an error of {}", h.position_bits,
+                                 h.position_step, h.position_error));
+    }
     for (int i = 0; i < 3; ++i) {
       if (h.bounds_lo[i] > h.bounds_hi[i]) return corrupt("bounds: expected lo <= hi");
     }

@@ -22,10 +22,13 @@ void MeasurePass::prepare(StreamBlock& block) const {
   for (size_t i = 0; i < positions.size(); i += 9) {
     if (!is_degenerate(&positions[i])) block.centroids.include(chunk_centroid(&positions[i]));
   }
+  block.corners = {};
+  if (corners_too_) include_corners(positions, block.corners);
 }
 
 Status MeasurePass::take(StreamBlock& block) {
   centroids_.include(block.centroids);
+  corners_.include(block.corners);
   done_(block.read_count);
   return {};
 }

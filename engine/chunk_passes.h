@@ -15,17 +15,19 @@ namespace shoal {
 
 using TrianglesDone = std::function<void(uint64_t)>;
 
-/// First: where the centroids lie, and how many triangles are stored.
+/// First: where the centroids lie, and, for a grid to round to, the corners.
 class MeasurePass : public BlockTaker {
  public:
-  explicit MeasurePass(const TrianglesDone& done) : done_(done) {}
+  MeasurePass(bool corners_too, const TrianglesDone& done) : corners_too_(corners_too), done_(done) {}
   void prepare(StreamBlock& block) const override;
   Status take(StreamBlock& block) override;
   const Bounds3& centroids() const { return centroids_; }
+  const Bounds3& corners() const { return corners_; }
 
  private:
+  const bool corners_too_;
   const TrianglesDone& done_;
-  Bounds3 centroids_;
+  Bounds3 centroids_, corners_;
 };
 
 /// Second: how many lie in each cell.

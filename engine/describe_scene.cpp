@@ -31,6 +31,13 @@ void append_pages(std::string& text, const char* name, uint64_t decoded, uint64_
 
 }  // namespace
 
+std::string describe_positions(const SceneHeader& header) {
+  if (header.position_bits == 0) return "exact";
+  if (header.position_step == 0) return fmt::format("exact: too small for {} bits", header.position_bits);
+  return fmt::format("{} bits, steps of up to {:g}: no point moved by more than {:g} in space", header.position_bits,
+                     header.position_step, header.position_error);
+}
+
 SceneDescription describe_scene(const Scene& scene) {
   SceneDescription d;
   d.file_bytes = scene.file->file_bytes();
@@ -88,6 +95,7 @@ std::string scene_description_text(const Scene& scene) {
   append_line(text, "treelets",
               fmt::format("{} of about {} KiB, the largest {} KiB", d.treelets_count, h.treelet_bytes >> 10,
                           (h.largest_treelet_bytes + 1023) >> 10));
+  append_line(text, "positions", describe_positions(h));
   append_pages(text, "geometry", d.geometry_bytes, d.geometry_stored_bytes);
   append_pages(text, "attributes", d.attribute_bytes, d.attribute_stored_bytes);
   append_pages(text, "textures", d.texture_bytes, d.texture_stored_bytes);
@@ -139,6 +147,9 @@ std::string scene_description_json(const Scene& scene) {
                {"attribute_bytes_per_triangle", d.attribute_bytes_per_triangle},
                {"attribute_stored_bytes_per_triangle", d.attribute_stored_bytes_per_triangle},
                {"largest_treelet_bytes", h.largest_treelet_bytes},
+               {"position_bits", h.position_bits},
+               {"position_step", h.position_step},
+               {"position_error", h.position_error},
                {"bounds_lo", h.bounds_lo},
                {"bounds_hi", h.bounds_hi},
                {"names", parsed(scene.names)},

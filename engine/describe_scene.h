@@ -21,6 +21,8 @@ struct SceneDescription {
   double attribute_bytes_per_triangle = 0, attribute_stored_bytes_per_triangle = 0;
 };
 
+/// "exact", or how coarse the grid is and how far it moved a point at most.
+std::string describe_positions(const SceneHeader& header);
 SceneDescription describe_scene(const Scene& scene);
 /// Lines of "name  value", for people.
 std::string scene_description_text(const Scene& scene);

@@ -231,6 +231,9 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
                    {"treelets_count", scene.treelets.size()},
                    {"instances_count", scene.top_tree.instance_count()},
                    {"geometry_bytes", scene.header.geometry_bytes},
+                   {"position_bits", scene.header.position_bits},
+                   {"position_step", scene.header.position_step},
+                   {"position_error", scene.header.position_error},
                    {"resident_table_bytes", scene.resident_bytes()}};
   json["effects"] = Json::parse(effects_plan_json(effects_plan(scene, picture.shading.effects, effect_askers(picture))));
   json["memory"] = plan_json(result.plan);

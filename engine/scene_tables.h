@@ -45,8 +45,12 @@ struct SceneHeader {
   uint64_t content_hash = 0;         ///< of the sources
   float bounds_lo[3], bounds_hi[3];  ///< world
   uint32_t largest_treelet_bytes = 0, largest_attribute_bytes = 0;
-  uint32_t reserved[4] = {};
+  uint32_t position_bits = 0;        ///< PositionPrecision (engine/position_grid.h)
+  float position_step = 0;           ///< of the coarsest grid; 0: no position was rounded
+  float position_error = 0;          ///< how far a point was moved at most, world
+  uint32_t reserved[1] = {};
 };
+static_assert(sizeof(SceneHeader) == 112);
 
 /// Geometry pages ascend from treelet to treelet, so that a page finds its treelet by binary search; the attribute
 /// page, if any, is the page after the geometry page.

@@ -30,8 +30,9 @@ struct Lane {
 
 class ObjectStream {
  public:
-  ObjectStream(const StreamInput& input, const ObjectPlan& object, CornerLayout layout, BlockTaker& taker)
-      : input_(input), object_(object), layout_(layout), taker_(taker) {
+  ObjectStream(const StreamInput& input, const ObjectPlan& object, CornerLayout layout, const PositionGrid& grid,
+               BlockTaker& taker)
+      : input_(input), object_(object), layout_(layout), grid_(grid), taker_(taker) {
     for (const uint32_t m : object.meshes) {
       for (const PrimitiveSource& source : input.geometry.meshes[m].primitives) sources_.push_back(&source);
     }
@@ -98,6 +99,7 @@ class ObjectStream {
       lane.open_source = lane.source;
     }
     SHOAL_RETURN_IF_ERROR(lane.reader->read(lane.first, lane.count, lane.block.triangles));
+    grid_.round(lane.block.triangles.soup.positions);
     lane.block.read_count = lane.count;
     taker_.prepare(lane.block);
     return {};
@@ -112,6 +114,7 @@ class ObjectStream {
   const StreamInput& input_;
   const ObjectPlan& object_;
   const CornerLayout layout_;
+  const PositionGrid grid_;
   BlockTaker& taker_;
   std::vector<const PrimitiveSource*> sources_;
   size_t source_ = 0;  // the next block
@@ -126,7 +129,7 @@ class ObjectStream {
 }  // namespace
 
 Status ObjectSource::stream(bool with_corners, BlockTaker& taker) {
-  ObjectStream stream(input_, object_, with_corners ? layout_ : CornerLayout{}, taker);
+  ObjectStream stream(input_, object_, with_corners ? layout_ : CornerLayout{}, grid_, taker);
   const Status status = stream.run();
   read_bytes_ += stream.read_bytes();
   return status;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/plan_objects.h"
+#include "engine/position_grid.h"
 #include "engine/read_mesh.h"
 
 namespace shoal {
@@ -19,7 +20,7 @@ struct StreamBlock {
   uint64_t read_count = 0;          ///< triangles of the source that it stands for, degenerate ones too
   std::vector<uint32_t> tags;       ///< for prepare() to leave something to take(), one a triangle
   std::vector<std::byte> records;   ///< likewise
-  Bounds3 centroids;                ///< likewise
+  Bounds3 centroids, corners;       ///< likewise
 };
 
 class BlockTaker {
@@ -61,6 +62,8 @@ class ObjectSource : public TriangleSource {
   ObjectSource(const StreamInput& input, const ObjectPlan& object, CornerLayout layout)
       : input_(input), object_(object), layout_(layout) {}
   Status stream(bool with_corners, BlockTaker& taker) override;
+  /// From now on corners are rounded to the grid as they are read.
+  void round_to(const PositionGrid& grid) { grid_ = grid; }
   uint64_t read_bytes() const { return read_bytes_; }
   const CornerLayout& layout() const { return layout_; }
 
@@ -71,6 +74,7 @@ class ObjectSource : public TriangleSource {
   const StreamInput& input_;
   const ObjectPlan& object_;
   CornerLayout layout_;
+  PositionGrid grid_;
   uint64_t read_bytes_ = 0;
 };
 

@@ -119,7 +119,7 @@ void measure_leaves(const TriangleSoup& soup, std::span<uint32_t> order, std::sp
     const std::span<uint32_t> triangles = order.subspan(node.first, node.count);
     std::sort(triangles.begin(), triangles.end());
     LeafVertices leaf;
-    gather_leaf(soup.positions, triangles, leaf);
+    gather_leaf(soup, triangles, leaf);
     uint32_t primitives[kMaxLeafTriangles];
     for (size_t t = 0; t < triangles.size(); ++t) primitives[t] = soup.primitive[triangles[t]];
     node.bytes = LeafParts::of(plan_leaf(leaf, {primitives, triangles.size()})).padded_bytes();
@@ -286,10 +286,10 @@ uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout) {
   return triangles * each;
 }
 
-uint64_t page_in_flight_bytes(uint32_t treelet_bytes, const CornerLayout& layout) {
+uint64_t page_in_flight_bytes(uint32_t treelet_bytes, const CornerLayout& layout, bool on_grid) {
   // The page, its nodes and its leaves while vectors grow to twice their size; then the corners of its triangles, of
-  // which each takes 12 bytes of the page at least, with the table that finds equal ones.
-  const uint64_t triangles = treelet_bytes / 12;
+  // which each takes 12 bytes of the page at least, or 9 on a grid, with the table that finds equal ones.
+  const uint64_t triangles = treelet_bytes / (on_grid ? 9 : 12);
   const uint64_t corner_bytes = layout.floats() == 0 ? 0 : 2 * 4ull * layout.floats() + 4 + 16;
   return 5ull * treelet_bytes + triangles * (8 + 3 * corner_bytes);
 }

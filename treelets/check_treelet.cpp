@@ -66,8 +66,8 @@ Status check_leaf(const TreeletView& treelet, uint32_t offset) {
     return corrupt(fmt::format("leaf at {} has {} triangles and {} vertices", at, triangles, vertices));
   }
   const uint8_t flags = leaf.header().flags;
-  if ((flags & ~(kLeafHighMask | kLeafFloats | kLeafCoverage)) != 0 ||
-      (leaf.has_floats() && (flags & kLeafHighMask) != 0) || leaf.header().primitive_bytes > sizeof(uint32_t)) {
+  if ((flags & ~(kLeafHighMask | kLeafFloats | kLeafCoverage | kLeafGrid)) != 0 ||
+      (leaf.has_floats() && (flags & (kLeafHighMask | kLeafGrid)) != 0) || leaf.header().primitive_bytes > sizeof(uint32_t)) {
     return corrupt(fmt::format("leaf at {} has flags {:#x} and {} bytes a primitive id", at, flags,
                                leaf.header().primitive_bytes));
   }

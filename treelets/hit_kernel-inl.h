@@ -22,12 +22,23 @@ using F4 = hn::FixedTag<float, 4>;
 using D4 = hn::FixedTag<double, 4>;
 using V4 = hn::Vec<F4>;
 
-/// A coordinate of the three corners; the fourth lane is zero.
-HWY_INLINE V4 load_corners(const LeafView& leaf, uint32_t axis, const uint32_t vertex[3]) {
+/// Of a leaf that is stored otherwise than as the bits of floats in parts.
+HWY_INLINE V4 load_other_corners(const LeafView& leaf, uint32_t axis, const uint32_t vertex[3]) {
   if (leaf.has_floats()) {
     const float* at = leaf.floats(axis);
     return V4{lanes_set(at[vertex[0]], at[vertex[1]], at[vertex[2]])};
   }
+  const uint8_t *low = leaf.grid_low(axis), *high = leaf.grid_high(axis);
+  const uint32_t present = 0u - (leaf.header().flags >> axis & 1u);
+  const int32_t base = leaf.grid_base(axis);
+  const auto at = [&](uint32_t v) { return base + static_cast<int32_t>(low[v] + ((uint32_t{high[v]} & present) << 8)); };
+  const hn::Vec<hn::FixedTag<int32_t, 4>> steps{_mm_setr_epi32(at(vertex[0]), at(vertex[1]), at(vertex[2]), 0)};
+  return hn::Mul(hn::ConvertTo(F4(), steps), hn::Set(F4(), leaf.grid_step(axis)));
+}
+
+/// A coordinate of the three corners; the fourth lane is zero.
+HWY_INLINE V4 load_corners(const LeafView& leaf, uint32_t axis, const uint32_t vertex[3]) {
+  if (!leaf.has_bits()) return load_other_corners(leaf, axis, vertex);
   const uint16_t* low = leaf.low(axis);
   const uint8_t* high = leaf.high(axis);
   const uint32_t present = 0u - (leaf.header().flags >> axis & 1u), base = leaf.base(axis);

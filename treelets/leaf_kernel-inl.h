@@ -27,24 +27,55 @@ struct ShearedLanes {
   V16 x, y, z;  ///< z: along RaySpace::kz from the origin, not sheared
 };
 
-/// A coordinate of the vertices from `first` on. Reads past the last vertex, inside the page and 64 bytes after it.
-HWY_INLINE V16 load_vertices(const LeafView& leaf, uint32_t axis, size_t first) {
-  const F16 f;
+/// Of a leaf that has_bits(): load_vertices().
+HWY_INLINE V16 load_bits(const LeafView& leaf, uint32_t axis, size_t first) {
   const I16 i;
-  if (leaf.has_floats()) return hn::LoadU(f, leaf.floats(axis) + first);
   const auto low = hn::PromoteTo(i, hn::LoadU(hn::Rebind<uint16_t, F16>(), leaf.low(axis) + first));
   const auto high = hn::PromoteTo(i, hn::LoadU(hn::Rebind<uint8_t, F16>(), leaf.high(axis) + first));
   const auto above = hn::And(hn::ShiftLeft<16>(high), hn::Set(i, leaf.has_high(axis) ? -1 : 0));
-  return hn::BitCast(f, hn::Add(hn::Or(low, above), hn::Set(i, static_cast<int32_t>(leaf.base(axis)))));
+  return hn::BitCast(F16(), hn::Add(hn::Or(low, above), hn::Set(i, static_cast<int32_t>(leaf.base(axis)))));
+}
+
+struct GridLanes {
+  V16 steps, step;  ///< a coordinate is their product, which is exact
+};
+
+/// Of a leaf that has_grid().
+HWY_INLINE GridLanes load_grid(const LeafView& leaf, uint32_t axis, size_t first) {
+  const I16 i;
+  const hn::Rebind<uint8_t, F16> bytes;
+  const auto low = hn::PromoteTo(i, hn::LoadU(bytes, leaf.grid_low(axis) + first));
+  const auto high = hn::PromoteTo(i, hn::LoadU(bytes, leaf.grid_high(axis) + first));
+  const auto above = hn::And(hn::ShiftLeft<8>(high), hn::Set(i, leaf.has_high(axis) ? -1 : 0));
+  const auto word = hn::Set(i, static_cast<int32_t>(leaf.base(axis)));
+  const auto steps = hn::Add(hn::Or(low, above), hn::ShiftRight<8>(word));
+  const auto step = hn::ShiftRight<1>(hn::BitCast(hn::RebindToUnsigned<F16>(), hn::ShiftLeft<24>(word)));
+  return {hn::ConvertTo(F16(), steps), hn::BitCast(F16(), step)};
+}
+
+/// A coordinate of the vertices from `first` on. Reads past the last vertex, inside the page and 64 bytes after it.
+HWY_INLINE V16 load_vertices(const LeafView& leaf, uint32_t axis, size_t first) {
+  if (leaf.has_bits()) return load_bits(leaf, axis, first);
+  if (leaf.has_floats()) return hn::LoadU(F16(), leaf.floats(axis) + first);
+  const GridLanes lanes = load_grid(leaf, axis, first);
+  return hn::Mul(lanes.steps, lanes.step);
+}
+
+/// The same less that of the ray's origin. On a grid the product is exact: fused or not, the same bits.
+HWY_INLINE V16 load_from_origin(const RaySpace& ray, const LeafView& leaf, uint32_t axis, size_t first) {
+  const auto origin = hn::Set(F16(), ray.origin[axis]);
+  if (leaf.has_bits()) return hn::Sub(load_bits(leaf, axis, first), origin);
+  if (leaf.has_floats()) return hn::Sub(hn::LoadU(F16(), leaf.floats(axis) + first), origin);
+  const GridLanes lanes = load_grid(leaf, axis, first);
+  return hn::MulSub(lanes.steps, lanes.step, origin);
 }
 
 /// The vertices from `first` on, translated and sheared: shear() of triangle_test.h.
 HWY_INLINE ShearedLanes shear_vertices(const RaySpace& ray, const LeafView& leaf, size_t first) {
   const F16 f;
-  const auto x = load_vertices(leaf, ray.kx, first), y = load_vertices(leaf, ray.ky, first);
-  const auto z = hn::Sub(load_vertices(leaf, ray.kz, first), hn::Set(f, ray.origin[ray.kz]));
-  return {hn::Sub(hn::Sub(x, hn::Set(f, ray.origin[ray.kx])), hn::Mul(hn::Set(f, ray.shear_x), z)),
-          hn::Sub(hn::Sub(y, hn::Set(f, ray.origin[ray.ky])), hn::Mul(hn::Set(f, ray.shear_y), z)), z};
+  const auto x = load_from_origin(ray, leaf, ray.kx, first), y = load_from_origin(ray, leaf, ray.ky, first);
+  const auto z = load_from_origin(ray, leaf, ray.kz, first);
+  return {hn::Sub(x, hn::Mul(hn::Set(f, ray.shear_x), z)), hn::Sub(y, hn::Mul(hn::Set(f, ray.shear_y), z)), z};
 }
 
 HWY_INLINE hn::Vec<I16> corner_indices(const LeafView& leaf, uint32_t k, size_t first) {

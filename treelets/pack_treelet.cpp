@@ -66,7 +66,7 @@ class Packer {
 
   NodeRef add_leaf(const BinaryNode& node) {
     const std::span<const uint32_t> triangles = order_.subspan(node.first, node.count);
-    gather_leaf(soup_.positions, triangles, leaf_);
+    gather_leaf(soup_, triangles, leaf_);
     out_.leaf_area += half_area(node);
     ++out_.leaves_count;
     primitives_.clear();

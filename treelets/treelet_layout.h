@@ -8,11 +8,15 @@
 // Vertices shared inside a leaf are stored once. i0,i1,i2 keep the corner order of the source: barycentrics do not
 // depend on packing.
 //
-// Positions are exact float32, in one of two forms:
-//   kLeafFloats set      float x[V] | y[V] | z[V]
-//   kLeafFloats clear    uint32 base[3] | uint16 low[3][V] | uint8 high[V] of each axis with its kLeafHighX bit
-// where the bits of a float are base + low + (high << 16). Neighbours differ in their low bits only, so this takes 6
+// Positions are float32, in one of three forms, all of which give back the very bits that were packed:
+//   kLeafFloats    float x[V] | y[V] | z[V]
+//   kLeafGrid      int32 word[3] | uint8 low[3][V] | uint8 high[V] of each axis with its kLeafHighX bit
+//   neither        uint32 base[3] | uint16 low[3][V] | uint8 high[V] of each axis with its kLeafHighX bit
+// Neither: the bits of a float are base + low + (high << 16). Neighbours differ in their low bits only, so this takes 6
 // to 9 bytes a vertex instead of 12; what does not fit (bits of an axis that span 2^24 or more) is stored as floats.
+// kLeafGrid, where a build rounds positions to a grid (engine/position_grid.h): a coordinate is
+// ((word >> 8) + low + (high << 8)) * step, a whole number of less than 24 bits times a power of two, so that nothing is
+// rounded; the low 8 bits of the axis' word are the exponent bits of `step` as a float. 3 to 6 bytes a vertex.
 //
 // Primitives: primitive_bytes planes of uint8[T], the lowest byte first; the id is their value + first_primitive.
 //
@@ -73,6 +77,9 @@ inline constexpr uint8_t kLeafHighX = 1, kLeafHighY = 2, kLeafHighZ = 4;  ///< t
 inline constexpr uint8_t kLeafHighMask = 7;
 inline constexpr uint8_t kLeafFloats = 8;     ///< positions as floats; no high planes
 inline constexpr uint8_t kLeafCoverage = 16;  ///< some triangle has a coverage record
+inline constexpr uint8_t kLeafGrid = 32;      ///< positions as steps of a grid; not with kLeafFloats
+/// A leaf is on the grid only where every vertex is less than so many steps from zero.
+inline constexpr int32_t kMaxGridSteps = (1 << 23) - 1;
 
 struct LeafHeader {
   uint8_t triangle_count;     ///< 1 .. kMaxLeafTriangles

@@ -31,6 +31,8 @@ struct TriangleSoup {
   std::vector<uint32_t> primitive;  ///< global primitive id, unique in the scene
   std::vector<uint32_t> material;
   std::vector<float> corners;       ///< 3 * layout.floats() a triangle
+  /// A power of two that coordinates are multiples of, for leaves to be packed by; 0: none is known.
+  float position_step = 0;
 
   size_t size() const { return primitive.size(); }
 };

@@ -234,6 +234,34 @@ TEST(RenderScene, AGltfIsBuiltOnceIntoTheCacheAndAgainWhenItChanges) {
   EXPECT_EQ(folder.names("cache").size(), 3u);
 }
 
+TEST(RenderScene, PositionsAreAsPreciseAsTheyWereBuilt) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const std::string gltf = folder / "terrain/terrain.gltf", coarse = folder / "coarse.shoal";
+  const ProgramRun built = run_shoal(folder, {"build", gltf, "-o", coarse, "--positions", "16", "--quiet"});
+  expect_exit(built, 0);
+  const auto picture = [&](const std::string& scene, const std::string& name, const std::string& positions) {
+    std::vector<std::string> command = join({"render", scene, "-o", folder / name, "--quiet"}, tiny_picture());
+    if (!positions.empty()) command = join(command, {"--positions", positions});
+    return run_shoal(folder, command);
+  };
+  expect_exit(picture(coarse, "a.exr", ""), 0);
+  expect_exit(picture(coarse, "b.exr", "16"), 0);
+  expect_exit(picture(gltf, "c.exr", "16"), 0);
+  expect_exit(picture(gltf, "d.exr", "exact"), 0);
+  expect_error(picture(coarse, "e.exr", "21"), 2, {"coarse.shoal", "was built with --positions 16"});
+  expect_error(picture(coarse, "e.exr", "exact"), 2, {"coarse.shoal", "was built with --positions 16"});
+  expect_error(picture(folder / "terrain.shoal", "e.exr", "16"), 2, {"terrain.shoal", "was built with --positions exact"});
+  expect_exit(run_shoal(folder, {"diff", folder / "a.exr", folder / "c.exr"}), 0);
+  expect_exit(run_shoal(folder, {"diff", folder / "a.exr", folder / "d.exr"}), 10);
+  const ProgramRun info = run_shoal(folder, {"info", coarse});
+  expect_exit(info, 0);
+  EXPECT_THAT(info.out, HasSubstr("positions             16 bits, steps of up to"));
+  const json described = parsed(run_shoal(folder, {"info", coarse, "--json"}).out);
+  EXPECT_EQ(described["build"]["options"]["positions"], "16");
+  EXPECT_GT(described["position_error"], 0);
+}
+
 TEST(RenderScene, WithoutCacheFolderTheUsersIsTaken) {
   const TemporaryFolder folder;
   save(one_triangle(), folder / "scene");

@@ -21,7 +21,7 @@ void expect_usage(const ProgramRun& run, const std::vector<std::string>& parts) 
 TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
   const TemporaryFolder folder;
   const std::map<std::string, std::vector<std::string>> expected = {
-      {"build", {"--output", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
+      {"build", {"--output", "--positions", "exact, 21, 16", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--environment-rotation",    "--environment-intensity",
@@ -70,6 +70,8 @@ TEST(Usage, UnknownAndMissingOptionsExitTwoAndAreNamed) {
   expect_usage(run_shoal(folder, {"render", "x.gltf"}), {"--output"});
   expect_usage(run_shoal(folder, {"render", "x.gltf", "-o", "y.exr", "--shiny"}), {"--shiny"});
   expect_usage(run_shoal(folder, {"build", "x.gltf"}), {"--output"});
+  expect_usage(run_shoal(folder, {"build", "x.gltf", "-o", "y.shoal", "--positions", "20"}),
+               {"--positions", "expected exact, 21 or 16, found '20'"});
   expect_usage(run_shoal(folder, {"compare", "x.gltf"}), {"--out"});
   expect_usage(run_shoal(folder, {"accuracy", "x.gltf"}), {"--out"});
   expect_usage(run_shoal(folder, {"generate", "terrain"}), {"--out"});

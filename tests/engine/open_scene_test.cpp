@@ -123,6 +123,8 @@ TEST_F(OpenScene, NamesTheTableAndTheRowThatIsWrong) {
 TEST_F(OpenScene, RefusesWhatWouldBeReadOutsideItsTable) {
   const std::vector<std::pair<const char*, std::function<void(OpenedFile&)>>> changes = {
       {"header", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->version = 99; }},
+      {"precision", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->position_bits = 17; }},
+      {"precision", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->position_error = NAN; }},
       {"two headers", [](OpenedFile& f) { f.tables[tables::kSceneHeader].resize(2 * sizeof(SceneHeader)); }},
       {"half a row", [](OpenedFile& f) { f.tables[tables::kMaterials].resize(10); }},
       {"no table", [](OpenedFile& f) { f.tables.erase(tables::kEmitters); }},

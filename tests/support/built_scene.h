@@ -34,13 +34,16 @@ inline uint32_t append_object(TestScene& scene, const BuiltObject& object) {
   return base;
 }
 
+/// `position_step`: TriangleSoup's.
 inline TestScene build_scene(std::vector<std::vector<TestTriangle>> objects,
-                             const std::vector<Placement>& placements, uint32_t treelet_bytes) {
+                             const std::vector<Placement>& placements, uint32_t treelet_bytes,
+                             float position_step = 0) {
   TestScene scene;
   std::vector<BuiltObject> built;
   PageSink sink(scene.pages);
   for (const auto& object : objects) {
     TriangleSoup soup;
+    soup.position_step = position_step;
     for (const TestTriangle& t : object) {
       for (const Vec3& p : t.p) soup.positions.insert(soup.positions.end(), {p.x, p.y, p.z});
       soup.primitive.push_back(t.primitive);

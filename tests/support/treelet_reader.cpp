@@ -118,13 +118,14 @@ class Reader {
     expect(leaf.triangle_count >= 1 && leaf.triangle_count <= kMaxLeafTriangles, "triangles of a leaf");
     expect(leaf.vertex_count >= 3 && leaf.vertex_count <= kMaxLeafVertices, "vertices of a leaf");
     const size_t t_count = leaf.triangle_count, v_count = leaf.vertex_count;
-    const bool floats = (leaf.flags & kLeafFloats) != 0;
+    const bool floats = (leaf.flags & kLeafFloats) != 0, grid = (leaf.flags & kLeafGrid) != 0;
+    counts_.grid_leaves += grid;
     size_t indices = at + sizeof leaf + 12 * v_count;
     if (!floats) {
-      indices = at + sizeof leaf + 12 + 6 * v_count;
+      indices = at + sizeof leaf + 12 + (grid ? 3 : 6) * v_count;
       for (uint32_t axis = 0; axis < 3; ++axis) indices += (leaf.flags >> axis & 1) * v_count;
     }
-    expect(!floats || (leaf.flags & 7) == 0, "high planes beside floats");
+    expect(!floats || (leaf.flags & (7 | kLeafGrid)) == 0, "high planes or a grid beside floats");
     const size_t primitives = indices + 3 * t_count;
     expect(primitives + leaf.primitive_bytes * t_count <= header_.leaves_offset + header_.leaves_bytes, "leaf's end");
     triangle_.depth = depth;
@@ -153,6 +154,15 @@ class Reader {
     const size_t v_count = leaf.vertex_count, positions = at + sizeof leaf;
     if ((leaf.flags & kLeafFloats) != 0) return read<float>(*page_, positions + 4 * (axis * v_count + v));
     uint32_t bits = read<uint32_t>(*page_, positions + 4 * size_t{axis});
+    if ((leaf.flags & kLeafGrid) != 0) {
+      int64_t steps = (int64_t{bits} - (bits >= 0x80000000u ? int64_t{1} << 32 : 0) - (bits & 255)) / 256;
+      steps += read<uint8_t>(*page_, positions + 12 + axis * v_count + v);
+      size_t plane = positions + 12 + 3 * v_count;
+      for (uint32_t before = 0; before < axis; ++before) plane += (leaf.flags >> before & 1) * v_count;
+      if ((leaf.flags >> axis & 1) != 0) steps += 256 * int64_t{read<uint8_t>(*page_, plane + v)};
+      expect(std::abs(steps) < 1 << 24, "steps that a float cannot hold");
+      return std::ldexp(static_cast<float>(steps), static_cast<int>(bits & 255) - 127);
+    }
     bits += read<uint16_t>(*page_, positions + 12 + 2 * (axis * v_count + v));
     size_t plane = positions + 12 + 6 * v_count;
     for (uint32_t before = 0; before < axis; ++before) plane += (leaf.flags >> before & 1) * v_count;

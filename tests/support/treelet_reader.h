@@ -52,7 +52,7 @@ struct ReadTriangle {
 };
 
 struct ReadCounts {
-  uint64_t leaves = 0, wide_nodes = 0, wide_children = 0, top_nodes = 0, entries = 0;
+  uint64_t leaves = 0, grid_leaves = 0, wide_nodes = 0, wide_children = 0, top_nodes = 0, entries = 0;
 };
 
 /// Visits every triangle below the object's root. Throws also when a vertex lies outside a box above it, evaluated

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <cmath>
 #include <cstring>
 #include <map>
 
@@ -99,6 +100,44 @@ TEST(BuildObject, StoresEveryTriangleOfAGridOnce) {
   for (const uint32_t size : kSizes) {
     const TriangleSoup soup = testing::grid_soup(100);
     expect_holds(build(soup, size), soup);
+  }
+}
+
+size_t geometry_bytes(const Built& built) {
+  size_t bytes = 0;
+  for (const testing::StoredTreelet& treelet : built.sink.treelets) bytes += treelet.geometry.size();
+  return bytes;
+}
+
+TEST(BuildObject, StoresTheVeryPositionsOfAGridInFewerBytes) {
+  for (const float step : {0x1p-20f, 0x1p-16f, 0x1p-11f, 0x1p-9f}) {
+    TriangleSoup soup = testing::grid_soup(120);
+    for (float& x : soup.positions) x = std::nearbyint(x / step) * step - 0.5f;
+    const size_t plain = geometry_bytes(build(soup, 64u << 10));
+    soup.position_step = step;
+    const Built built = build(soup, 64u << 10);
+    const ReadCounts counts = expect_holds(built, soup);
+    EXPECT_GT(static_cast<double>(counts.grid_leaves), 0.9 * static_cast<double>(counts.leaves)) << step;
+    EXPECT_LT(static_cast<double>(geometry_bytes(built)), (step < 0x1p-12f ? 0.95 : 0.8) * static_cast<double>(plain))
+        << step;
+  }
+}
+
+TEST(BuildObject, StoresWhatIsNotOnTheGridAsItIs) {
+  TriangleSoup soup = testing::random_soup(1000, 0.02f);
+  for (size_t i = 0; i < soup.positions.size() / 2; ++i) {
+    soup.positions[i] = std::nearbyint(soup.positions[i] * 4096) / 4096 + 0.0f;
+  }
+  soup.position_step = 0x1p-12f;
+  const ReadCounts counts = expect_holds(build(soup, 16u << 10), soup, 0);
+  EXPECT_GT(counts.grid_leaves, 0u);
+  EXPECT_LT(counts.grid_leaves, counts.leaves);
+  for (const float step : {0x1p-126f, 1.0f, 0x1p104f}) {
+    for (testing::NamedSoup& hostile : testing::hostile_soups(200)) {
+      SCOPED_TRACE(hostile.name);
+      hostile.soup.position_step = step;
+      expect_holds(build(hostile.soup, 16u << 10), hostile.soup);
+    }
   }
 }
 

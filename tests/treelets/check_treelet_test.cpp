@@ -1,7 +1,7 @@
 // Pages from strangers: what does not fit is rejected; what passes may be traced whatever else is wrong with it.
 #include <gtest/gtest.h>
 
-#include "tests/support/hand_made_scene.h"
+#include "tests/support/built_scene.h"
 #include "treelets/attribute_layout.h"
 #include "treelets/trace_treelet_scalar.h"
 
@@ -69,6 +69,7 @@ TEST(CheckTreelet, RejectsFieldsThatDoNotFit) {
   rejects("triangle count", [](H& h, N*, B*, B*) { h.triangle_count = 0x40000001u; });
   rejects("bytes of primitive ids", [](H&, N*, B* leaf, B*) { leaf[3] = B{5}; });
   rejects("high planes of floats", [](H&, N*, B* leaf, B*) { leaf[2] |= B{kLeafHighY}; });
+  rejects("a grid of floats", [](H&, N*, B* leaf, B*) { leaf[2] |= B{kLeafGrid}; });
   rejects("unknown flags", [](H&, N*, B* leaf, B*) { leaf[2] |= B{0x80}; });
   rejects("coverage records", [](H& h, N*, B*, B*) { h.coverage_record_count = 1u << 30; });
   rejects("no coverage for covered leaves", [](H& h, N*, B*, B*) { h.coverage_offset = 0; });
@@ -124,14 +125,14 @@ TEST(CheckTreelet, TakesEveryShapeOfLeafOrRefusesIt) {
   size_t accepted = 0;
   for (uint32_t triangles = 0; triangles <= 17; ++triangles) {
     for (uint32_t vertices = 0; vertices <= 49; ++vertices) {
-      for (uint32_t flags = 0; flags < 32; ++flags) {
+      for (uint32_t flags = 0; flags < 64; ++flags) {
         for (const uint32_t primitive_bytes : {0u, 4u, 5u}) {
           const LeafHeader leaf{static_cast<uint8_t>(triangles), static_cast<uint8_t>(vertices),
                                 static_cast<uint8_t>(flags), static_cast<uint8_t>(primitive_bytes), 0, 0};
           const AlignedPage page = one_leaf(leaf, 0);
           const bool fits = triangles >= 1 && triangles <= 16 && vertices >= 1 && vertices <= 3 * triangles &&
-                            flags < kLeafCoverage && !((flags & kLeafFloats) && (flags & kLeafHighMask)) &&
-                            primitive_bytes <= 4;
+                            (flags & kLeafCoverage) == 0 && primitive_bytes <= 4 &&
+                            !((flags & kLeafFloats) && (flags & (kLeafHighMask | kLeafGrid)));
           ASSERT_EQ(check_root(page.bytes(), kLeafBit).ok(), fits)
               << triangles << " " << vertices << " " << flags << " " << primitive_bytes;
           if (!fits) continue;
@@ -162,6 +163,20 @@ TEST(CheckTreelet, RefusesPackedPositionsThatAreNotFinite) {
   EXPECT_EQ(status.error().code, ErrorCode::kCorrupt);
 }
 
+TEST(CheckTreelet, RefusesGridPositionsThatAreNotFinite) {
+  AlignedPage page = one_leaf({1, 3, kLeafGrid, 0, 0, 0}, 0);
+  std::byte* words = page.mutable_bytes().data() + sizeof(TreeletHeader) + sizeof(LeafHeader);
+  const auto accepts = [&](uint32_t y_word) {
+    std::memcpy(words + 4, &y_word, sizeof y_word);
+    return check_root(page.bytes(), kLeafBit).ok();
+  };
+  EXPECT_TRUE(accepts(0x7fffff00u | 231)) << "the largest base and 2^104";
+  EXPECT_FALSE(accepts(0x7fffff00u | 254)) << "more than any float";
+  EXPECT_TRUE(accepts(254)) << "zero steps of it";
+  EXPECT_FALSE(accepts(255)) << "a step that is none";
+  EXPECT_TRUE(accepts(0x80000000u)) << "steps of zero";
+}
+
 TEST(CheckTreelet, LeavesAtMostTheAgreedDepth) {
   const auto chain = [](uint32_t nodes) {
     TreeletHeader h{};
@@ -184,10 +199,8 @@ TEST(CheckTreelet, LeavesAtMostTheAgreedDepth) {
   EXPECT_FALSE(check_treelet(chain(kMaxTreeletDepth + 1).bytes()).ok());
 }
 
-TEST(CheckTreelet, WhatPassesMayBeTracedAndFound) {
-  std::mt19937 random(5);
-  NodeRef root;
-  const std::vector<std::byte> good = covered_page(random, &root);
+/// Damages `good` and traces what passes. Returns how many pages passed, and how many rays hit.
+std::pair<size_t, size_t> trace_damaged(std::mt19937& random, std::span<const std::byte> good, NodeRef root) {
   const Instance instance = make_instance({0, {}}, 1, {{-1, -1, -1}, {1, 1, 1}});
   size_t passed = 0, hits = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -210,6 +223,29 @@ TEST(CheckTreelet, WhatPassesMayBeTracedAndFound) {
     const TreeletTriangle triangle = find_triangle(page.bytes(), ray.hit.slot);
     EXPECT_EQ(intersect_known(ray, instance, triangle).t, ray.t);
   }
+  return {passed, hits};
+}
+
+TEST(CheckTreelet, WhatPassesMayBeTracedAndFound) {
+  std::mt19937 random(5);
+  NodeRef root;
+  const std::vector<std::byte> good = covered_page(random, &root);
+  const auto [passed, hits] = trace_damaged(random, good, root);
+  EXPECT_GT(passed, 2000u);
+  EXPECT_GT(hits, 500u);
+}
+
+TEST(CheckTreelet, WhatPassesOnAGridMayBeTracedAndFound) {
+  std::mt19937 random(6);
+  auto soup = random_soup(random, 200, 0.4f);
+  for (TestTriangle& t : soup) {
+    for (Vec3& p : t.p) {
+      for (int axis = 0; axis < 3; ++axis) p[axis] = std::nearbyint(p[axis] * 1024) / 1024 + 0.0f;
+    }
+  }
+  const TestScene scene = build_scene({soup}, {{0, {}}}, 64u << 10, 0x1p-10f);
+  ASSERT_EQ(scene.pages.size(), 1u);
+  const auto [passed, hits] = trace_damaged(random, scene.pages[0].bytes(), scene.entries[0].root);
   EXPECT_GT(passed, 2000u);
   EXPECT_GT(hits, 500u);
 }

@@ -323,15 +323,43 @@ TEST(SceneTracer, EndsWhenNoPageCanBeHad) {
   }
 }
 
+/// To whole multiples of `step`, with one kind of zero.
+std::vector<TestTriangle> rounded(std::vector<TestTriangle> triangles, float step) {
+  for (TestTriangle& t : triangles) {
+    for (Vec3& p : t.p) {
+      for (int axis = 0; axis < 3; ++axis) p[axis] = std::nearbyint(p[axis] / step) * step + 0.0f;
+    }
+  }
+  return triangles;
+}
+
+TEST(Trace, FindsWhatBruteForceFindsOnAGrid) {
+  // From steps that take two bytes of offset, or do not fit, to some that take one and make triangles degenerate.
+  std::mt19937 random(12);
+  for (const float step : {0x1p-20f, 0x1p-16f, 0x1p-12f, 0x1p-7f, 0x1p-5f}) {
+    const auto soup = rounded(random_soup(random, 1500, 0.1f), step);
+    const auto mesh = rounded(closed_mesh(12, 24, 0.2f, 1500), step);
+    Placement turned;
+    turned.object = 1;
+    turned.object_to_world = {{0.3f, 0.4f, 0}, {-0.4f, 0.3f, 0.1f}, {0, 0, -0.5f}, {0.5f, -2, 1}};
+    const TestScene scene = build_scene({soup, mesh}, {{0, {}}, turned}, 16u << 10, step);
+    EXPECT_GT(compare(scene, awkward_rays(random, soup, 500)), 150u) << step;
+  }
+}
+
 TEST(Trace, GivesTheSameBitsOnEveryInstructionSet) {
   std::mt19937 random(8);
-  const auto soup = random_soup(random, 1000, 0.2f);
+  const auto soup = random_soup(random, 1000, 0.2f), on_grid = rounded(soup, 0x1p-12f);
   const TestScene scene = make_scene({soup}, {{0, {}}}, {100, 7});
+  const TestScene exact = build_scene({soup}, {{0, {}}}, 8u << 10);
+  const TestScene grid = build_scene({on_grid}, {{0, {}}}, 8u << 10, 0x1p-12f);
   const auto rays = awkward_rays(random, soup, 1000);
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
     EXPECT_GT(compare(scene, rays), 300u) << hwy::TargetName(target);
+    EXPECT_GT(compare(exact, rays), 300u) << hwy::TargetName(target);
+    EXPECT_GT(compare(grid, rays), 300u) << hwy::TargetName(target);
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
