@@ -89,6 +89,17 @@ AccuracyKnob triangle_test_knob() {
                                                                      {"double", TriangleTest::kDouble}})};
 }
 
+AccuracyKnob positions_knob() {
+  std::vector<std::pair<std::string, PositionPrecision>> named;
+  for (const PositionPrecision p : {PositionPrecision::k16, PositionPrecision::k21, PositionPrecision::kExact}) {
+    named.emplace_back(position_precision_name(p), p);
+  }
+  return {"positions", "--positions",
+          "Bits of a vertex's position along the scene's longest side. Fewer make a smaller file of fewer treelets, and "
+          "move surfaces by a known distance at most.",
+          true, true, values_at([](auto& s) -> auto& { return s.build.positions; }, std::move(named))};
+}
+
 }  // namespace
 
 size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
@@ -100,7 +111,7 @@ size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
 
 std::vector<AccuracyKnob> accuracy_knobs(const AccuracySettings& base) {
   return {samples_knob(base), bounces_knob(base), roulette_knob(base), texture_filter_knob(), light_choice_knob(),
-          triangle_test_knob()};
+          triangle_test_knob(), positions_knob()};
 }
 
 Result<std::vector<AccuracyKnob>> choose_knobs(std::vector<AccuracyKnob> knobs, const std::vector<std::string>& names) {

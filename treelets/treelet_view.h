@@ -48,13 +48,13 @@ struct LeafParts {
 struct LeafView {
   const std::byte* leaf;
   uint32_t triangle_count, vertex_count;
-  LeafParts parts;
+  uint32_t corners;  ///< LeafParts::corners
 
   explicit LeafView(const std::byte* at)
       : leaf(at),
         triangle_count(header().triangle_count),
         vertex_count(header().vertex_count),
-        parts(LeafParts::of(header())) {}
+        corners(LeafParts::of(header()).corners) {}
 
   const LeafHeader& header() const { return *reinterpret_cast<const LeafHeader*>(leaf); }
   bool has_coverage() const { return (header().flags & kLeafCoverage) != 0; }
@@ -63,9 +63,9 @@ struct LeafView {
   /// Neither: the bits of floats, in parts.
   bool has_bits() const { return (header().flags & (kLeafFloats | kLeafGrid)) == 0; }
   /// Bytes with padding: where the next leaf begins.
-  uint32_t bytes() const { return parts.padded_bytes(); }
+  uint32_t bytes() const { return LeafParts::of(header()).padded_bytes(); }
   /// i0[], i1[] or i2[] of the triangles.
-  const uint8_t* corner(uint32_t k) const { return bytes_at(parts.corners) + size_t{k} * triangle_count; }
+  const uint8_t* corner(uint32_t k) const { return bytes_at(corners) + size_t{k} * triangle_count; }
 
   /// x[], y[] or z[] of the vertices. Requires: has_floats().
   const float* floats(uint32_t axis) const {
