@@ -265,8 +265,12 @@ class SceneBuilder {
     SHOAL_RETURN_IF_ERROR(
         append_emitters(emitters_of_[object], shown, static_cast<uint32_t>(placed_.size()), emitters_));
     report_.instanced_triangles_count += built_[object].triangles_count;
-    report_.position_error =
-        std::max(report_.position_error, farthest_shift(steps_[object], placed->instance.object_to_world));
+    const auto note_shift = [&](const Instance& there) {
+      report_.position_error =
+          std::max(report_.position_error, farthest_shift(steps_[object], there.object_to_world));
+    };
+    note_shift(placed->instance);
+    for (const Instance& key : placed->keys) note_shift(key);  // between two keys no point is moved by more
     placed_.push_back(*placed);
     return {};
   }
