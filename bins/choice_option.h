@@ -7,7 +7,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include "engine/accuracy_names.h"
+
 namespace shoal {
+
+/// Of such a list (engine/accuracy_names.h).
+template <class T, size_t N>
+std::map<std::string, T> choices_of(const NamedValue<T> (&list)[N]) {
+  std::map<std::string, T> choices;
+  for (const NamedValue<T>& named : list) choices.emplace(named.name, named.value);
+  return choices;
+}
 
 /// "a, b, c": the names in the order of their values.
 template <class T>

@@ -12,6 +12,7 @@
 #include <map>
 #include <system_error>
 
+#include "bins/accuracy_options.h"
 #include "bins/choice_option.h"
 #include "bins/lens_options.h"
 #include "bins/positions_option.h"
@@ -226,9 +227,8 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("scene", scene, "scene: .gltf, .glb (built first where needed) or .shoal")->required();
   app.add_option("--width", picture.width, "picture width in pixels")->capture_default_str();
   app.add_option("--height", picture.height, "picture height in pixels")->capture_default_str();
-  samples = app.add_option("--spp", picture.samples, "samples a pixel")->capture_default_str();
-  app.add_option("--bounces", picture.shading.bounces, "scattering events of a path at most")->capture_default_str();
-  app.add_option("--seed", picture.shading.seed, "of the random numbers")->capture_default_str();
+  declare_accuracy(app, picture);
+  samples = app.get_option("--spp");
   declare_lens(app, picture);
   declare_pose(app, pose);
   declare_positions(app, positions);
@@ -239,28 +239,11 @@ void RenderArguments::declare(CLI::App& app) {
   app.add_option("--environment-intensity", picture.shading.environment.intensity,
                  "what its radiance is multiplied by")
       ->capture_default_str();
-  static const std::map<std::string, LightChoice> kLightChoices{{"tree", LightChoice::kTree},
-                                                                {"power", LightChoice::kPower}};
-  add_choice(app, "--light-choice", picture.shading.light_choice, kLightChoices,
-             ": by what one of many lights is chosen")
-      ->group("For experiments");
   app.add_option("--variant", variant, kVariantHelp);
   app.add_option("--effects", effects,
                  "force effects off or on: -NAME or +NAME, separated by commas (--effects=-sheen,-textures), all, "
                  "-all; `shoal info` lists them. On changes no picture")
       ->type_name("LIST");
-  static const std::map<std::string, TextureFilter> kFilters{{"mip", TextureFilter::kMip},
-                                                             {"bilinear", TextureFilter::kBilinear}};
-  add_choice(app, "--texture-filter", picture.shading.texture_filter, kFilters,
-             ": textures by the width of the ray (default), or always at their finest")
-      ->type_name("WAY");
-  static const std::map<std::string, TriangleTest> kTriangleTests{{"fast", TriangleTest::kFast},
-                                                                  {"watertight", TriangleTest::kWatertight},
-                                                                  {"double", TriangleTest::kDouble}};
-  add_choice(app, "--triangle-test", picture.shading.triangle_test, kTriangleTests,
-             ": all in float, which may let light through where triangles meet; with exact signs (default); sheared in "
-             "double as well")
-      ->type_name("WAY");
   app.add_option("--threads", execution.threads, "threads; 0: all")->check(CLI::Range(0, 4096))->capture_default_str();
   app.add_option("--max-memory", max_memory, kMaxMemoryHelp);
   app.add_option("--policy", execution.policy, "which queue is drained next: resident-first, fullest, sweep, full")

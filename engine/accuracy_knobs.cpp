@@ -3,14 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <set>
 #include <utility>
+
+#include "engine/accuracy_names.h"
 
 namespace shoal {
 namespace {
 
-constexpr uint32_t kNever = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNever = ShadingOptions::kNoRoulette;
 
 /// A knob over one member: `place` finds it in settings.
 template <class Place, class Value>
@@ -27,7 +28,7 @@ std::vector<KnobValue> values_at(Place place, std::vector<std::pair<std::string,
 template <class Place>
 std::vector<KnobValue> numbers_at(Place place, const std::set<uint32_t>& numbers) {
   std::vector<std::pair<std::string, uint32_t>> named;
-  for (const uint32_t number : numbers) named.emplace_back(number == kNever ? "never" : std::to_string(number), number);
+  for (const uint32_t number : numbers) named.emplace_back(number == kNever ? "off" : std::to_string(number), number);
   return values_at(place, std::move(named));
 }
 
@@ -54,7 +55,7 @@ AccuracyKnob bounces_knob(const AccuracySettings& base) {
 }
 
 AccuracyKnob roulette_knob(const AccuracySettings& base) {
-  return {"roulette", "",
+  return {"roulette", "--roulette-start",
           "The bounce from which chance may end a path that carries little light; those that go on count for more, so that "
           "the mean stays right. Sooner is faster, and noisier.",
           false, false,
@@ -72,10 +73,11 @@ AccuracyKnob texture_filter_knob() {
 
 AccuracyKnob light_choice_knob() {
   return {"light-choice", "--light-choice",
-          "How one of many lights is drawn: by power alone, or by what each may bring to the place that is lit.", false,
+          "How one of many lights is drawn: all alike, by power alone, or by what each may bring to the place that is lit.", false,
           false,
           values_at([](auto& s) -> auto& { return s.picture.shading.light_choice; },
-                    std::vector<std::pair<std::string, LightChoice>>{{"power", LightChoice::kPower},
+                    std::vector<std::pair<std::string, LightChoice>>{{"uniform", LightChoice::kUniform},
+                                                                    {"power", LightChoice::kPower},
                                                                     {"tree", LightChoice::kTree}})};
 }
 
@@ -100,6 +102,15 @@ AccuracyKnob positions_knob() {
           true, true, values_at([](auto& s) -> auto& { return s.build.positions; }, std::move(named))};
 }
 
+AccuracyKnob sampler_knob() {
+  std::vector<std::pair<std::string, SamplerKind>> kinds;
+  for (const auto& [name, kind] : kSamplers) kinds.emplace_back(name, kind);
+  return {"sampler", "--sampler",
+          "How the samples of a pixel are spread: at random, evenly, or evenly with the neighbours' so that errors are fine "
+          "grained.",
+          false, false, values_at([](auto& s) -> auto& { return s.picture.shading.sampler; }, std::move(kinds))};
+}
+
 }  // namespace
 
 size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
@@ -110,8 +121,8 @@ size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
 }
 
 std::vector<AccuracyKnob> accuracy_knobs(const AccuracySettings& base) {
-  return {samples_knob(base), bounces_knob(base), roulette_knob(base), texture_filter_knob(), light_choice_knob(),
-          triangle_test_knob(), positions_knob()};
+  return {samples_knob(base),     sampler_knob(),      bounces_knob(base),   roulette_knob(base),
+          texture_filter_knob(), light_choice_knob(), triangle_test_knob(), positions_knob()};
 }
 
 Result<std::vector<AccuracyKnob>> choose_knobs(std::vector<AccuracyKnob> knobs, const std::vector<std::string>& names) {

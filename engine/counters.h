@@ -40,6 +40,7 @@ namespace shoal {
   X(texture_lookups_count, "lookups", "texture look-ups")                                                     \
   X(texture_tiles_pinned_count, "tiles", "changes from a texture tile to another, a thread at a time")         \
   X(coverage_tests_count, "tests", "alpha coverage tests in traversal")                                       \
+  X(clamped_samples_count, "samples", "contributions lowered to --clamp-direct or --clamp-indirect")           \
   X(invalid_samples_count, "samples", "contributions that were not finite: dropped")                          \
   X(film_saturated_count, "samples", "contributions too large for the film: clamped")
 

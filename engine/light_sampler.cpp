@@ -63,9 +63,9 @@ double range_attenuation(const PunctualLight& light, double distance2) {
 double emitter_area(const Emitter& emitter) { return 0.5 * glm::length(doubled_area_vector(emitter)); }
 
 LightSampler::LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment,
-                           unsigned threads, uint64_t few)
-    : scene_(&scene), sources_(sources), environment_(&environment) {
-  plant_tree(threads, few);
+                           unsigned threads, LightChoice choice)
+    : scene_(&scene), sources_(sources), environment_(&environment), uniform_(choice == LightChoice::kUniform) {
+  if (choice == LightChoice::kTree) plant_tree(threads);
   if (!has_tree()) weigh_emitters();
   weigh_choices();
 }
@@ -120,7 +120,11 @@ void LightSampler::weigh_choices() {
   for (const double p : powers) {
     if (p > 0 && std::isfinite(p)) sum += p, ++count;
   }
-  for (double& p : powers) p = p > 0 && std::isfinite(p) ? 0.5 * p / sum + 0.5 / count : 0.0;
+  for (size_t i = 0; i < powers.size(); ++i) {
+    const bool gives = powers[i] > 0 && std::isfinite(powers[i]);
+    const double alike = i == singles_.size() ? emitters_.total() : 1.0;  // how many lights this is, if uniform_
+    powers[i] = !gives ? 0.0 : uniform_ ? alike : 0.5 * powers[i] / sum + 0.5 / count;
+  }
   choices_ = Distribution1D(powers);
   if (emitters_.total() > 0) emitter_density_ = choices_.probability(singles_.size()) / emitters_.total();
 }
@@ -128,7 +132,10 @@ void LightSampler::weigh_choices() {
 void LightSampler::weigh_emitters() {
   std::vector<double> weights;
   weights.reserve(sources_.emitters.size());
-  for (const Emitter& e : sources_.emitters) weights.push_back(weight_of(emitter_at(e, 0.5f)));
+  for (const Emitter& e : sources_.emitters) {
+    const double weight = weight_of(emitter_at(e, 0.5f));
+    weights.push_back(uniform_ && weight > 0 ? 1.0 : weight);
+  }
   emitters_ = Distribution1D(weights);
 }
 
@@ -139,12 +146,12 @@ double LightSampler::placed_power() const {
   return power;
 }
 
-void LightSampler::plant_tree(unsigned threads, uint64_t few) {
+void LightSampler::plant_tree(unsigned threads) {
   // Strengths go to the tree as parts of the largest, so that floats hold them and their sum.
   double largest = 0;
   uint64_t count = 0;
   each_placed([&](const auto&, double strength, uint32_t) { largest = std::max(largest, strength), ++count; });
-  if (count <= few) return;
+  if (count <= kFewLights) return;
   std::vector<TreeLight> lights;
   lights.reserve(count);
   each_placed([&](const auto& light, double strength, uint32_t index) {
@@ -210,10 +217,11 @@ double LightSampler::shrinking(const Hit& hit, float time) const {
   return area > 0 ? area_at(*emitter, 0.5f) / area : 0.0;
 }
 
-double LightSampler::tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const {
+double LightSampler::found_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const {
   const Emitter* const emitter = find_emitter(hit);
   if (emitter == nullptr) return 0;
-  const double chance = tree_.chance(receiver, static_cast<uint32_t>(emitter - sources_.emitters.data()));
+  const auto index = static_cast<uint32_t>(emitter - sources_.emitters.data());
+  const double chance = has_tree() ? tree_.chance(receiver, index) : emitters_.probability(index);
   const double area = chance > 0 ? area_at(*emitter, time) : 0.0;
   return area > 0 ? choices_.probability(singles_.size()) * chance / area : 0.0;
 }

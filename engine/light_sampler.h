@@ -4,7 +4,8 @@
 // are **placed**: where there are more than kFewLights of them, they are one choice among the others, and a tree
 // (engine/light_tree) says which of them, by what each may bring to the vertex. With fewer, all emissive triangles
 // together are one choice and each point or spot light is one; among the triangles the chance is proportional to area *
-// Material::emission_weight, so that their density is known from a material alone.
+// Material::emission_weight, so that their density is known from a material alone. With LightChoice::kPower it is so of
+// any number. With kUniform each triangle, each punctual light and the environment have the same chance.
 // Among these choices the chances are fixed, half by power and half evenly, so that neither a dim light nearby nor a
 // bright one far away is starved. Powers: emitters 2 pi * area * luminance, point 4 pi I, spot 2 pi (1 - cos outer) I,
 // directional pi R^2 E, environment 4 pi^2 R^2 * mean luminance (R: half the diagonal of the scene). The point on a
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "engine/environment.h"
+#include "engine/light_choice.h"
 #include "engine/light_tree.h"
 #include "engine/sample_distribution.h"
 #include "engine/scene.h"
@@ -55,11 +57,12 @@ class LightSampler {
   /// So many placed lights have no tree: two triangles are one lamp, and two lamps gain less than a tree costs.
   static constexpr uint64_t kFewLights = 2;
 
-  /// Keeps references to what it is given. `threads` build the tree, if there are more placed lights than `few`.
-  LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1, uint64_t few = kFewLights)
-      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials}, environment, threads, few) {}
+  /// Keeps references to what it is given. `threads` build the tree, if there is to be one.
+  LightSampler(const Scene& scene, const Environment& environment, unsigned threads = 1,
+               LightChoice choice = LightChoice::kTree)
+      : LightSampler(scene, {scene.emitters, scene.lights, scene.materials}, environment, threads, choice) {}
   LightSampler(const Scene& scene, const LightSources& sources, const Environment& environment, unsigned threads,
-               uint64_t few);
+               LightChoice choice);
 
   bool empty() const { return !(choices_.total() > 0); }
   /// Light is chosen by where it arrives: without, the receiver that the others take does not matter.
@@ -72,7 +75,7 @@ class LightSampler {
   /// Density by area with which sample() finds a point on the emissive triangle that was hit, of this material; 0 when it
   /// never does.
   double emitter_pdf(const Material& material, const Hit& hit, const LightReceiver& receiver, float time = 0.5f) const {
-    if (has_tree()) return tree_emitter_pdf(hit, receiver, time);
+    if (has_tree() || uniform_) return found_emitter_pdf(hit, receiver, time);
     const double pdf = emitter_density_ * sampled_weight(material);
     return pdf > 0 && moves(hit.instance) ? pdf * shrinking(hit, time) : pdf;
   }
@@ -103,7 +106,7 @@ class LightSampler {
   double shrinking(const Hit& hit, float time) const;
   double weight_of(const Emitter& emitter) const;
   void weigh_choices();
-  void plant_tree(unsigned threads, uint64_t few);
+  void plant_tree(unsigned threads);
   double placed_power() const;
   /// Calls use(light, strength, its index in the tree) for each placed light that gives any light.
   template <class Use>
@@ -113,15 +116,16 @@ class LightSampler {
                              float time) const;
   LightSample sample_punctual(const PunctualLight& light, const Vec3& position, double chance) const;
   LightSample sample_environment(double chance, const LightRandom& random) const;
-  double tree_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const;
+  double found_emitter_pdf(const Hit& hit, const LightReceiver& receiver, float time) const;
 
   const Scene* scene_;
   LightSources sources_;
   const Environment* environment_;
+  bool uniform_;                   ///< LightChoice::kUniform
   std::vector<uint32_t> singles_;  ///< indices of the punctual lights that are a choice each
   Distribution1D choices_;         ///< singles_, then the tree or the emitters as one, then the environment
   LightTree tree_;                 ///< emitters by their index, then punctual lights
-  Distribution1D emitters_;        ///< without a tree
+  Distribution1D emitters_;        ///< without a tree; uniform: 1 each
   double emitter_density_ = 0;     ///< likewise: chance of the emitters / sum of area * weight
 };
 

@@ -21,21 +21,21 @@ inline RayKind kind_of(const Ray& ray) {
 }
 
 /// What a ray's coverage is decided by. Ray::has_coverage() is true of it.
-inline uint32_t coverage_seed(const PathState& path, uint64_t seed, bool any_hit) {
-  const uint32_t bits = random4(seed, path.pixel, path.sample, path.bounce, Dimension::kCoverage).bits[any_hit ? 1 : 0];
+inline uint32_t coverage_seed(const PathState& path, const Sampler& sampler, bool any_hit) {
+  const uint32_t bits = sampler.hash(path.pixel, path.sample, path.bounce, Dimension::kCoverage).bits[any_hit ? 1 : 0];
   return (bits & 0xffffu) == Ray::kNoCoverage ? bits ^ 1 : bits;
 }
 
 /// What the rays of a picture carry beside their way: without `coverage` every triangle is there.
 struct RaySeeds {
-  uint64_t seed = 0;
+  const Sampler& sampler;
   bool coverage = true;
   ShutterTimes times = ShutterTimes::kNone;
 
   uint32_t of(const PathState& path, bool any_hit) const {
-    const uint32_t bits = coverage ? coverage_seed(path, seed, any_hit) : Ray::kNoCoverage;
+    const uint32_t bits = coverage ? coverage_seed(path, sampler, any_hit) : Ray::kNoCoverage;
     if (times == ShutterTimes::kNone) return bits;
-    return (time_bits(path, seed, times) & 0xffff0000u) | (bits & 0xffffu);
+    return (time_bits(path, sampler, times) & 0xffff0000u) | (bits & 0xffffu);
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <thread>
 
 #include "engine/aov_film.h"
@@ -119,6 +120,12 @@ Status check_picture(const PictureOptions& picture) {
   if (picture.samples == 0 || picture.samples > (1u << 22)) {
     return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
   }
+  const ShadingOptions& shading = picture.shading;
+  for (const float limit : {shading.clamp_direct, shading.clamp_indirect}) {
+    if (!(limit >= 0) || std::isinf(limit)) {
+      return Error{ErrorCode::kUsage, fmt::format("contributions clamped to {}: must be a number >= 0", limit)};
+    }
+  }
   if (picture.tile_sample == 0) {
     return Error{ErrorCode::kUsage, "one in 0 tiles: must be at least one in 1"};
   }
@@ -146,6 +153,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   PassPlan passes(picture.samples, execution.time_limit_seconds);
   SampleOrder samples(picture.width, picture.height, passes.next(now_seconds() - start), picture.tile_sample,
                       previewed ? coarse_levels(plan) : 0);
+  const Sampler sampler(picture.shading.sampler, picture.shading.seed, picture.width, picture.height, picture.samples);
   Film film(picture.width, picture.height);
   std::unique_ptr<AovFilm> aovs;
   if (!picture.aovs.empty()) {
@@ -160,7 +168,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
                   },
                   orders.waiting_work(), execution.paging);
   if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
-  RenderContext context{scene, picture, *tables, camera, samples, hooks, cache, film, execution.threads};
+  RenderContext context{scene, picture, *tables, camera, samples, sampler, hooks, cache, film, execution.threads};
   context.start_seconds = start;
   context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;

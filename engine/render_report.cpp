@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "engine/accuracy_names.h"
 #include "engine/camera.h"
 #include "engine/effects.h"
 #include "engine/process_memory.h"
@@ -129,6 +130,8 @@ Json lens_json(const Scene& scene, const PictureOptions& picture) {
   return json;
 }
 
+Json roulette_json(uint32_t start) { return start == ShadingOptions::kNoRoulette ? Json("off") : Json(start); }
+
 Json options_json(const RenderResult& result, const Scene& scene, const PictureOptions& picture,
                   const ExecutionOptions& execution) {
   return {{"width", picture.width},
@@ -139,13 +142,17 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"lens", lens_json(scene, picture)},
           {"tile_sample", picture.tile_sample},
           {"bounces", picture.shading.bounces},
+          {"roulette_start", roulette_json(picture.shading.roulette_start)},
+          {"clamp_direct", picture.shading.clamp_direct},
+          {"clamp_indirect", picture.shading.clamp_indirect},
+          {"sampler", sampler_name(picture.shading.sampler)},
           {"seed", picture.shading.seed},
           {"environment", environment_text(picture.shading.environment)},
           {"environment_rotation_degrees", picture.shading.environment.rotation},
           {"environment_intensity", picture.shading.environment.intensity},
-          {"light_choice", picture.shading.light_choice == LightChoice::kTree ? "tree" : "power"},
+          {"light_choice", light_choice_name(picture.shading.light_choice)},
           {"effects", effects_text(picture.shading.effects)},
-          {"texture_filter", picture.shading.texture_filter == TextureFilter::kMip ? "mip" : "bilinear"},
+          {"texture_filter", texture_filter_name(picture.shading.texture_filter)},
           {"triangle_test", triangle_test_name(picture.shading.triangle_test)},
           {"aovs", aov_names(picture.aovs)},
           {"order", order_name(result.order.order)},
@@ -162,6 +169,18 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"max_memory_bytes", execution.max_memory_bytes},
           {"page_cache_bytes", execution.page_cache_bytes},
           {"rays_in_flight", execution.rays_in_flight}};
+}
+
+/// What trades accuracy for time, as the options name it.
+void add_accuracy(const ShadingOptions& shading, ExrImage& image) {
+  image.text["sampler"] = sampler_name(shading.sampler);
+  image.text["lightChoice"] = light_choice_name(shading.light_choice);
+  image.text["textureFilter"] = texture_filter_name(shading.texture_filter);
+  image.numbers["bounces"] = static_cast<float>(shading.bounces);
+  const bool roulette = shading.roulette_start != ShadingOptions::kNoRoulette;
+  image.text["rouletteStart"] = roulette ? fmt::format("{}", shading.roulette_start) : "off";
+  image.numbers["clampDirect"] = shading.clamp_direct;
+  image.numbers["clampIndirect"] = shading.clamp_indirect;
 }
 
 }  // namespace
@@ -210,6 +229,7 @@ ExrImage picture_image(const RenderResult& result, const Scene& scene, const Pic
   image.text["software"] = "Shoal " SHOAL_VERSION;
   image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
   image.numbers["samplesPerPixel"] = static_cast<float>(result.samples.mean);
+  add_accuracy(picture.shading, image);
   image.matrices["worldToCamera"] = to_camera;
   const Projection projection = projection_of(record, picture.lens);
   const bool flat = projection == Projection::kPerspective || projection == Projection::kOrthographic;

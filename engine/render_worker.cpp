@@ -87,9 +87,9 @@ void run_on_threads(RenderContext& context, const std::function<void(unsigned)>&
 RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
     : context_(context),
       phases_(context.phases[thread]),
-      shader_(context.scene, context.tables, context.picture.shading, context.cache),
+      shader_(context.scene, context.tables, context.picture.shading, context.sampler, context.cache),
       camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
-      seeds_{context.picture.shading.seed, context.tables.has_coverage(),
+      seeds_{context.sampler, context.tables.has_coverage(),
              shutter_times(context.scene.top_tree, context.picture.shading.effects)},
       aovs_(context.aovs) {
   if (aovs_ == nullptr) return;
@@ -111,14 +111,14 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.medium = 0;
   path.radiance = Vec3(0);
   path.shadow_radiance = Vec3(0);
-  const uint64_t seed = context_.picture.shading.seed;
-  const Random4 in_pixel = random4(seed, path.pixel, path.sample, 0, Dimension::kPixel);
+  const Sampler& sampler = context_.sampler;
+  const Random4 in_pixel = sampler.draw(path.pixel, path.sample, 0, Dimension::kPixel);
   const Random4 on_lens =
-      context_.camera.has_aperture() ? random4(seed, path.pixel, path.sample, 0, Dimension::kLens) : Random4{};
+      context_.camera.has_aperture() ? sampler.draw(path.pixel, path.sample, 0, Dimension::kLens) : Random4{};
   const Camera& camera = context_.camera;
   const CameraRay camera_ray =
       camera.moves()
-          ? camera.at(time_of(path, seed, ShutterTimes::kSpread)).ray(sample.x, sample.y, in_pixel, on_lens)
+          ? camera.at(time_of(path, sampler, ShutterTimes::kSpread)).ray(sample.x, sample.y, in_pixel, on_lens)
           : camera.ray(sample.x, sample.y, in_pixel, on_lens);
   path.origin = camera_ray.origin;
   path.direction = camera_ray.direction;
@@ -316,6 +316,7 @@ void RenderWorker::hand_in() {
   c.vertices_shaded_count = shade_counters_.vertices_shaded_count;
   c.texture_lookups_count = shade_counters_.texture_lookups_count;
   c.texture_tiles_pinned_count = shader_.texture_tiles_pinned_count();
+  c.clamped_samples_count = shade_counters_.clamped_samples_count;
   c.invalid_samples_count += shade_counters_.invalid_samples_count;
   std::lock_guard guard(context_.mutex);
   context_.counters.add(c);

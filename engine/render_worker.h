@@ -34,6 +34,7 @@ struct RenderContext {
   const ShadingTables& tables;
   const Camera& camera;
   const SampleOrder& samples;  ///< of this pass (engine/pass_plan.h): another between two passes
+  const Sampler& sampler;
   const RenderHooks& hooks;
   PageCache& cache;
   Film& film;

@@ -1,6 +1,17 @@
 // Random numbers as a pure function of (seed, pixel, sample, bounce, dimension): no state, no order, no thread.
-// Independent samples from a 4-in-4-out integer hash: pcg4d, Jarzynski & Olano 2020, "Hash Functions for GPU
-// Rendering", JCGT 9(3), listing "pcg4d". Called by engine/camera and engine/shade. Cost: about 5 ns for four numbers.
+//
+// kIndependent: a 4-in-4-out integer hash, pcg4d: Jarzynski & Olano 2020, "Hash Functions for GPU Rendering",
+// JCGT 9(3), listing "pcg4d".
+// kSobol: each (pixel, bounce, dimension) has the points of a Sobol sequence to itself, in an order and with an Owen
+// scrambling of its own ("padding", Burley 2020, section 4; engine/sobol.h). So the samples of a pixel are spread evenly
+// over what one dimension decides, in every prefix of 2^k samples, and are independent between dimensions and pixels.
+// kBlueNoise: each (bounce, dimension) has one Sobol sequence for the whole picture: pixels take runs of it along a
+// Z-curve whose quadrants come in a random order at every level (Ahmed & Wonka 2020, "Screen-Space Blue-Noise
+// Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), section 4). Neighbours
+// share a larger net, so that their errors cancel: of high frequency, which the eye and filters take for less. The
+// points of a sample depend on the samples a pixel has, rounded up to a power of two.
+//
+// Called by engine/camera, engine/path_ray and engine/shade. Cost of a draw in instructions: see docs/sampling.md.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +20,8 @@
 
 namespace shoal {
 
-/// Each dimension names four numbers in [0, 1).
+/// Each dimension names four numbers in [0, 1). Those of kLight and kBsdf are a choice (0, and with more digits 0 and 3)
+/// and a point of a square (1, 2); kPixel and kLens ask for a point (0, 1), the others for one number (0).
 enum class Dimension : uint32_t {
   kPixel = 0,
   kLens = 1,
@@ -28,6 +40,7 @@ struct Random4 {
   float uniform(int i) const { return static_cast<float>(bits[i] >> 8) * 0x1p-24f; }
 };
 
+/// Neighbouring seeds permute what they are given: Sampler hashes them first.
 inline Random4 random4(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) {
   uint32_t x = pixel ^ static_cast<uint32_t>(seed);
   uint32_t y = sample ^ static_cast<uint32_t>(seed >> 32);
@@ -41,12 +54,42 @@ inline Random4 random4(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t 
   return {{x, y, z, w}};
 }
 
-inline constexpr uint32_t reversed_bits(uint32_t x) {
-  x = (x >> 16) | (x << 16);
-  x = ((x & 0xff00ff00u) >> 8) | ((x & 0x00ff00ffu) << 8);
-  x = ((x & 0xf0f0f0f0u) >> 4) | ((x & 0x0f0f0f0fu) << 4);
-  x = ((x & 0xccccccccu) >> 2) | ((x & 0x33333333u) << 2);
-  return ((x & 0xaaaaaaaau) >> 1) | ((x & 0x55555555u) << 1);
-}
+enum class SamplerKind : uint8_t { kIndependent, kSobol, kBlueNoise };
+
+/// What the samples of a pixel are to each other.
+enum class SampleSets : uint8_t {
+  kOne,     ///< spread evenly together
+  kHalves,  ///< those with even and those with odd numbers are independent of each other, each spread evenly
+};
+
+/// The samples of one picture. Immutable.
+class Sampler {
+ public:
+  /// Of a picture with `samples` a pixel. Only kBlueNoise asks for its size and samples; more of either than said here
+  /// are as good, but not blue.
+  Sampler(SamplerKind kind, uint64_t seed, uint32_t width, uint32_t height, uint32_t samples,
+          SampleSets sets = SampleSets::kOne);
+
+  Random4 draw(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const {
+    if (kind_ == SamplerKind::kIndependent) return hash(pixel, sample, bounce, dimension);
+    return kind_ == SamplerKind::kSobol ? draw_sobol(pixel, sample, bounce, dimension)
+                                        : draw_blue_noise(pixel, sample, bounce, dimension);
+  }
+  /// Independent of each other whatever the kind: for what hashes them on.
+  Random4 hash(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const {
+    return random4(seed_, pixel, sample, bounce, dimension);
+  }
+
+ private:
+  Random4 draw_sobol(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const;
+  Random4 draw_blue_noise(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const;
+
+  SamplerKind kind_;
+  uint64_t seed_;              ///< hashed
+  uint32_t width_;
+  uint32_t half_bits_;         ///< so many of a sample's last bits say which half it is of
+  uint32_t sample_bits_ = 0;   ///< blue noise: an index is that of a pixel in its tile, then so many bits of the sample
+  uint32_t tile_levels_ = 0;   ///< ... and a tile is 2^tile_levels_ pixels wide
+};
 
 }  // namespace shoal

@@ -8,7 +8,6 @@
 #include "engine/lambert_bsdf.h"
 #include "engine/material_sample.h"
 #include "engine/math.h"
-#include "engine/sampler.h"
 #include "engine/shading_tables.h"
 #include "engine/surface.h"
 #include "treelets/moving_instance.h"
@@ -27,19 +26,6 @@ constexpr bool kOnlyLambert = false;
 constexpr float kMinSurvival = 0.05f;
 
 bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-/// A contribution that is not finite is dropped and counted.
-void add_radiance(Vec3& sum, const Vec3& term, ShadeCounters& counters) {
-  if (finite(term)) {
-    sum += term;
-  } else {
-    ++counters.invalid_samples_count;
-  }
-}
-
-Random4 path_random(const PathState& path, uint64_t seed, Dimension dimension) {
-  return random4(seed, path.pixel, path.sample, path.bounce, dimension);
-}
 
 /// Two words as one number in [0, 1): enough digits to choose among any number of emitters.
 double uniform53(uint32_t high, uint32_t low) {
@@ -74,14 +60,29 @@ bool wants_cones(const Scene& scene, const ShadingOptions& options) {
 
 }  // namespace
 
-Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache)
+Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options,
+               const Sampler& sampler, PageCache& cache)
     : scene_(&scene),
       tables_(&tables),
       options_(&options),
+      sampler_(sampler),
       materials_(tables.impl().materials.materials()),
       times_(shutter_times(scene.top_tree, options.effects)),
       textures_(scene.textures, cache),
       follows_cones_(!kOnlyLambert && wants_cones(scene, options)) {}
+
+void Shader::add_light(Vec3& sum, Vec3 term, uint32_t scatterings, ShadeCounters& counters) const {
+  if (!finite(term)) {
+    ++counters.invalid_samples_count;
+    return;
+  }
+  const float limit = scatterings > 1 ? options_->clamp_indirect : options_->clamp_direct;
+  if (limit > 0 && scatterings > 0 && max_component(term) > limit) {
+    term *= limit / max_component(term);  // all channels alike: the hue stays
+    ++counters.clamped_samples_count;
+  }
+  sum += term;
+}
 
 Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
                          std::span<const std::byte> attributes, ShadeResult& result, ShadeCounters& counters,
@@ -155,7 +156,7 @@ TextureFootprint Shader::reach(PathState& path, const Surface& surface) const {
   const RayCone cone = unpack_cone(path.cone);
   const float width = cone.width + cone.spread * glm::length(surface.position.point - path.origin);
   path.cone = pack_cone({width, cone.spread});
-  return {surface, width, path_random(path, options_->seed, Dimension::kTexture).uniform(0)};
+  return {surface, width, random(path, Dimension::kTexture).uniform(0)};
 }
 
 Status Shader::add_emission(PathState& path, const Surface& surface, const Material& material,
@@ -175,7 +176,7 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
     const double cosine = glm::dot(surface.geometric_normal, surface.wo);
     weight = cosine > 0 ? mis_weight(path.bsdf_pdf, area_pdf * glm::dot(along, along) / cosine) : 0.0f;
   }
-  add_radiance(path.radiance, path.throughput * emission * weight, counters);
+  add_light(path.radiance, path.throughput * emission * weight, path.bounce, counters);
   return {};
 }
 
@@ -184,14 +185,14 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
                             ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters) {
   const LightSampler& lights = *tables_->impl().lights;
   if (lights.empty()) return {};
-  const Random4 random = path_random(path, options_->seed, Dimension::kLight);
+  const Random4 drawn = random(path, Dimension::kLight);
   LightReceiver receiver;
   if (lights.has_tree()) {
     receiver = {offset_point(surface.position, surface.geometric_normal), light_side(surface, bsdf)};
   }
   const LightSample light =
       lights.sample(surface.position.point, receiver,
-                    {uniform53(random.bits[0], random.bits[3]), random.uniform(1), random.uniform(2)}, time_of(path));
+                    {uniform53(drawn.bits[0], drawn.bits[3]), drawn.uniform(1), drawn.uniform(2)}, time_of(path));
   if (!(light.pdf > 0)) return {};
   const BsdfValue f = bsdf.evaluate(light.direction);
   if (f.value == Vec3(0)) return {};
@@ -210,8 +211,8 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
     radiance *= transmittance(medium, glm::length(light.target.point - surface.position.point));
   }
   const float weight = light.delta ? 1.0f : mis_weight(light.pdf, f.pdf);
-  add_radiance(path.shadow_radiance, path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf),
-               counters);
+  add_light(path.shadow_radiance, path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf),
+            path.bounce + 1, counters);
   if (path.shadow_radiance == Vec3(0)) return {};
 
   result.has_shadow = true;
@@ -233,13 +234,13 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsd
                            ShadeResult& result) const {
   // After the last scattering a bounce can only find emission.
   if (path.bounce + 1 >= options_->bounces && !tables_->impl().lights_hit_by_chance) return;
-  const Random4 random = path_random(path, options_->seed, Dimension::kBsdf);
-  const BsdfSample sample = bsdf.sample(random.uniform(0), random.uniform(1), random.uniform(2));
+  const Random4 drawn = random(path, Dimension::kBsdf);
+  const BsdfSample sample = bsdf.sample(drawn.uniform(0), drawn.uniform(1), drawn.uniform(2));
   Vec3 throughput = path.throughput * sample.weight;
   if (!(sample.pdf > 0) || !finite(throughput) || throughput == Vec3(0)) return;
   if (path.bounce >= options_->roulette_start) {
     const float survival = std::clamp(max_component(throughput), kMinSurvival, 1.0f);
-    if (path_random(path, options_->seed, Dimension::kRoulette).uniform(0) >= survival) return;
+    if (random(path, Dimension::kRoulette).uniform(0) >= survival) return;
     throughput /= survival;
   }
   path.throughput = throughput;
@@ -266,7 +267,7 @@ const MaterialLayers& Shader::layers_of(const Material& material) const {
 Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
                          ShadeCounters& counters) {
   SHOAL_ASSIGN_OR_RETURN(const Vec3 color, sample_base_color(material, surface, textures));
-  add_radiance(path.radiance, path.throughput * color, counters);
+  add_light(path.radiance, path.throughput * color, path.bounce, counters);
   return {};
 }
 
@@ -288,7 +289,7 @@ void Shader::absorb(PathState& path, const Surface& surface, uint32_t material, 
 void Shader::disperse(const PathState& path, const MaterialLayers& layers, LayeredSample& values) const {
   if (!(layers.dispersion > 0) || !values.volume || !(values.transmission > 0)) return;
   // A path has one wavelength, whatever it meets.
-  const float u = random4(options_->seed, path.pixel, path.sample, 0, Dimension::kWavelength).uniform(0);
+  const float u = sampler_.draw(path.pixel, path.sample, 0, Dimension::kWavelength).uniform(0);
   const float nanometres = kShortestWave + (kLongestWave - kShortestWave) * u;
   values.ior = dispersed_ior(layers.ior, layers.dispersion, nanometres);
   values.disperses = true;
@@ -324,7 +325,7 @@ void Shader::shade_miss(PathState& path, ShadeCounters& counters) {
   const Vec3 direction = glm::normalize(path.direction);
   float weight = 1;
   if (path.bsdf_pdf > 0) weight = mis_weight(path.bsdf_pdf, tables.lights->environment_pdf(direction));
-  add_radiance(path.radiance, path.throughput * tables.environment.radiance(direction) * weight, counters);
+  add_light(path.radiance, path.throughput * tables.environment.radiance(direction) * weight, path.bounce, counters);
 }
 
 }  // namespace shoal

@@ -9,7 +9,9 @@
 #include <string>
 
 #include "engine/effects.h"
+#include "engine/light_choice.h"
 #include "engine/path_state.h"
+#include "engine/sampler.h"
 #include "engine/scene.h"
 #include "engine/shutter_times.h"
 #include "engine/surface_features.h"
@@ -32,9 +34,6 @@ struct EnvironmentOptions {
   bool fallback = false;  ///< nobody asked for it: the scene has no light
 };
 
-/// By what one of many lights is chosen: a tree, which knows where they are, or their power alone.
-enum class LightChoice : uint8_t { kTree, kPower };
-
 inline constexpr uint64_t kMaxEnvironmentPixels = uint64_t{1} << 26;
 
 struct ShadingOptions {
@@ -42,7 +41,12 @@ struct ShadingOptions {
   /// ray and a bounce only when k < bounces. 0: emission seen by the camera; 1: direct light; 2: one indirect
   /// bounce.
   uint32_t bounces = 8;
+  static constexpr uint32_t kNoRoulette = 0xffffffffu;
   uint32_t roulette_start = 3;  ///< the first vertex at which Russian roulette may end a path
+  /// The most that one contribution to a path may have in its largest channel; 0: no limit. Light that was scattered once
+  /// on its way to the camera is direct, light scattered more often indirect; what is seen directly has no limit.
+  float clamp_direct = 0, clamp_indirect = 0;
+  SamplerKind sampler = SamplerKind::kSobol;
   uint64_t seed = 0;
   EnvironmentOptions environment;
   LightChoice light_choice = LightChoice::kTree;
@@ -82,13 +86,16 @@ struct ShadeResult {
 struct ShadeCounters {
   uint64_t vertices_shaded_count = 0;
   uint64_t texture_lookups_count = 0;
+  uint64_t clamped_samples_count = 0;  ///< contributions that were lowered to a limit
   uint64_t invalid_samples_count = 0;  ///< contributions that were not finite: dropped, counted, reported
 };
 
 class Shader {
  public:
-  /// Keeps references to all four. `cache` serves texture tiles; kPinnedTilesPerThread at most are pinned.
-  Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, PageCache& cache);
+  /// Keeps references to scene, tables, options and cache, which serves texture tiles; kPinnedTilesPerThread at most are
+  /// pinned. `sampler`: of the options.
+  Shader(const Scene& scene, const ShadingTables& tables, const ShadingOptions& options, const Sampler& sampler,
+         PageCache& cache);
 
   /// Shades path.hit. Requires: path.hit.valid(), both rays of the vertex before are home. `geometry` is the hit
   /// treelet's decoded page, `attributes` its attribute page or empty. Adds emission to path.radiance, sets
@@ -132,16 +139,23 @@ class Shader {
                      ShadeResult& result) const;
   Status note_features(const PathState& path, const Surface& surface, const Material& material, uint32_t effects,
                        TextureContext& textures);
+  /// Adds light that was scattered so often; clamped, or dropped if it is not finite, and counted.
+  void add_light(Vec3& sum, Vec3 term, uint32_t scatterings, ShadeCounters& counters) const;
+  /// Of the vertex that is shaded.
+  Random4 random(const PathState& path, Dimension dimension) const {
+    return sampler_.draw(path.pixel, path.sample, path.bounce, dimension);
+  }
   TextureContext context(ShadeCounters& counters, CacheCounters& cache_counters);
   const MaterialLayers& layers_of(const Material& material) const;
   /// Of the shutter.
   float time_of(const PathState& path) const {
-    return times_ == ShutterTimes::kNone ? 0.5f : shoal::time_of(path, options_->seed, times_);
+    return times_ == ShutterTimes::kNone ? 0.5f : shoal::time_of(path, sampler_, times_);
   }
 
   const Scene* scene_;
   const ShadingTables* tables_;
   const ShadingOptions* options_;
+  Sampler sampler_;
   std::span<const Material> materials_;
   ShutterTimes times_;
   TextureSampler textures_;

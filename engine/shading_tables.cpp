@@ -77,8 +77,7 @@ Result<std::unique_ptr<ShadingTables>> ShadingTables::create(FileSystem& fs, con
   LightSources sources{scene.emitters, scene.lights, materials};
   if ((effects.off & kEffectEmission) != 0) sources.emitters = {};
   if ((effects.off & kEffectPunctualLights) != 0) sources.lights = {};
-  const bool planted = options.light_choice == LightChoice::kTree;
-  impl->lights.emplace(scene, sources, impl->environment, threads, planted ? LightSampler::kFewLights : UINT64_MAX);
+  impl->lights.emplace(scene, sources, impl->environment, threads, options.light_choice);
   impl->lights_hit_by_chance = !impl->environment.black();
   impl->coverage = (effects.on & kEffectCoverage) != 0;
   const uint32_t called = effects_called_for(scene, effects);

@@ -19,16 +19,15 @@ inline ShutterTimes shutter_times(const TopTree& tree, const EffectChoice& effec
   return (effects.off & kEffectMotion) != 0 ? ShutterTimes::kMiddle : ShutterTimes::kSpread;
 }
 
-/// time_of() a path, in the upper half. The samples of a pixel spread evenly over the shutter: the binary radical
-/// inverse (van der Corput 1935), turned by a random number of the pixel (Cranley & Patterson 1976).
-inline uint32_t time_bits(const PathState& path, uint64_t seed, ShutterTimes times) {
+/// time_of() a path, in the upper half: spread over the shutter as the sampler spreads the samples of a pixel.
+inline uint32_t time_bits(const PathState& path, const Sampler& sampler, ShutterTimes times) {
   if (times != ShutterTimes::kSpread) return 0x80000000u;
-  return reversed_bits(path.sample) + random4(seed, path.pixel, 0, 0, Dimension::kTime).bits[0];
+  return sampler.draw(path.pixel, path.sample, 0, Dimension::kTime).bits[0];
 }
 
 /// Ray::time() of all rays of a path, where anything moves.
-inline float time_of(const PathState& path, uint64_t seed, ShutterTimes times) {
-  return Ray::shutter_time(time_bits(path, seed, times));
+inline float time_of(const PathState& path, const Sampler& sampler, ShutterTimes times) {
+  return Ray::shutter_time(time_bits(path, sampler, times));
 }
 
 }  // namespace shoal

@@ -72,7 +72,7 @@ TEST(Accuracy, OptionsThatMakeNoSenseExitTwoBeforeAnythingIsWritten) {
   const auto expect = [&](const std::vector<std::string>& options, const std::vector<std::string>& parts) {
     expect_error(run_shoal(folder, accuracy(folder, options)), 2, parts);
   };
-  expect({"--knobs", "samples,shine"}, {"unknown knob 'shine'", "samples, bounces, roulette"});
+  expect({"--knobs", "samples,shine"}, {"unknown knob 'shine'", "samples, sampler, bounces, roulette"});
   expect({"--budget", "soon"}, {"'soon' is not a time", "s, m or h"});
   expect({"--budget", "-5m"}, {"'-5m' is not a time"});
   expect({"--budget", "5d"}, {"'5d' is not a time"});

@@ -86,6 +86,8 @@ TEST(Usage, ValuesThatAreNotOfTheirKindExitTwoAndAreNamed) {
   expect_usage(run_shoal(folder, join(render, {"--width", "-3"})), {"--width", "-3"});
   expect_usage(run_shoal(folder, join(render, {"--order", "random"})),
                {"--order", "auto, queued, depth-first, sorted", "'random'"});
+  expect_usage(run_shoal(folder, join(render, {"--sampler", "magic"})),
+               {"--sampler", "independent, sobol, blue-noise", "'magic'"});
   expect_usage(run_shoal(folder, join(render, {"--progress", "loud"})), {"--progress", "json", "'loud'"});
   expect_usage(run_shoal(folder, join(render, {"--log-level", "loud"})), {"--log-level", "warning", "'loud'"});
   expect_usage(run_shoal(folder, join(render, {"--state-levels", "33"})), {"--state-levels", "33"});

@@ -49,16 +49,17 @@ TEST_F(Accuracy, FindsTheBiasOfFewBouncesAndNoneOfRoulette) {
   EXPECT_TRUE(few->error.biased);
   EXPECT_GT(few->bias(), 0.3);
   EXPECT_GT(few->flip, result.base().flip);
-  for (const char* value : {"1", "never"}) {
+  for (const char* value : {"1", "off"}) {
     const AccuracyRow* roulette = result.find("roulette", value);
     ASSERT_NE(roulette, nullptr);
     EXPECT_FALSE(roulette->error.biased) << value;
   }
-  EXPECT_GT(result.find("roulette", "1")->error.variance.value, result.find("roulette", "never")->error.variance.value);
+  EXPECT_GT(result.find("roulette", "1")->error.variance.value, result.find("roulette", "off")->error.variance.value);
 }
 
-TEST_F(Accuracy, VarianceFallsWithTheNumberOfSamples) {
+TEST_F(Accuracy, VarianceFallsWithTheNumberOfIndependentSamples) {
   job_.base.picture.shading.bounces = 32;
+  job_.base.picture.shading.sampler = SamplerKind::kIndependent;
   const AccuracyResult result = measure();
   const AccuracyRow *one = result.find("samples", "1"), *many = result.find("samples", "16");
   ASSERT_TRUE(one != nullptr && many != nullptr);

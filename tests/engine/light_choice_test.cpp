@@ -59,7 +59,7 @@ double area_pdf(const LightSample& sample, const Vec3& position) {
 TEST(LightSampler, ByPowerTheDensityOfAnEmitterIsKnownFromItsMaterialAlone) {
   const Lamps s;
   const Environment none;
-  const LightSampler lights(s.scene, none, 1, 100);
+  const LightSampler lights(s.scene, none, 1, LightChoice::kPower);
   ASSERT_FALSE(lights.has_tree());
   const Vec3 position(0.5f, 0, 0.25f);
   int punctual = 0, bright = 0, drawn = 0;
@@ -82,6 +82,33 @@ TEST(LightSampler, ByPowerTheDensityOfAnEmitterIsKnownFromItsMaterialAlone) {
   EXPECT_NEAR(static_cast<double>(bright) / drawn, 1.0 / 3, 0.015);
   // Powers: 2 pi * 6 for the emitters, 4 pi for the point: half of the choice by power, half evenly.
   EXPECT_NEAR(static_cast<double>(punctual) / kDraws, 0.5 * 0.25 + 0.5 * 0.5, 0.015);
+}
+
+TEST(LightSampler, UniformlyEveryTriangleAndLampHasTheSameChance) {
+  const Lamps s;
+  const Environment none;
+  const LightSampler lights(s.scene, none, 1, LightChoice::kUniform);
+  ASSERT_FALSE(lights.has_tree());
+  const Vec3 position(0.5f, 0, 0.25f);
+  std::vector<int> drawn(s.scene.emitters.size());
+  int punctual = 0;
+  constexpr int kDraws = 20000;
+  for (int i = 0; i < kDraws; ++i) {
+    const Random4 r = random4(1, static_cast<uint32_t>(i), 0, 0, Dimension::kLight);
+    const LightSample sample = lights.sample(position, {}, {r.uniform(0), r.uniform(1), r.uniform(2)});
+    ASSERT_GT(sample.pdf, 0);
+    if (sample.delta) {
+      ++punctual;
+      continue;
+    }
+    const Emitter& e = *sample.emitter;
+    ++drawn[static_cast<size_t>(&e - s.scene.emitters.data())];
+    const double known = lights.emitter_pdf(s.scene.materials[e.material], {e.instance, e.primitive, 0, 0}, {});
+    EXPECT_NEAR(area_pdf(sample, position) / known, 1, 1e-4);
+  }
+  const double chance = 1.0 / (static_cast<double>(drawn.size()) + static_cast<double>(s.scene.lights.size()));
+  EXPECT_NEAR(static_cast<double>(punctual) / kDraws, chance * static_cast<double>(s.scene.lights.size()), 0.015);
+  for (const int n : drawn) EXPECT_NEAR(static_cast<double>(n) / kDraws, chance, 0.015);
 }
 
 TEST(LightSampler, ByTheTreeTheDensityOfAnEmitterIsThatOfItsSamples) {

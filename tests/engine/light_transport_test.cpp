@@ -118,6 +118,36 @@ TEST(LightTransport, RussianRouletteChangesNothingOnAverage) {
   expect_close(s.mean_radiance(kEye, kDown, 20000), without, 0.03f);
 }
 
+TEST(LightTransport, EverySamplerHasTheSameMean) {
+  struct Estimate {
+    double mean = 0, variance = 0;  ///< of the mean of all pixels
+  };
+  const auto estimate = [](SamplerKind kind) {
+    ShadingScene s = floor_scene(2, 2, 1);
+    s.scene.materials[1].base_color[1] = 0.8f;
+    ShadingOptions options = with_bounces(4);
+    options.sampler = kind, options.seed = 3, options.roulette_start = 1;
+    s.prepare(options);
+    constexpr uint32_t kPixels = 1500, kSamples = 16;
+    double sum = 0, squares = 0;
+    for (uint32_t pixel = 0; pixel < kPixels; ++pixel) {
+      double mean = 0;
+      for (uint32_t i = 0; i < kSamples; ++i) mean += s.radiance(kEye, kDown, pixel, i).y / kSamples;
+      sum += mean, squares += mean * mean;
+    }
+    const double mean = sum / kPixels;
+    return Estimate{mean, (squares / kPixels - mean * mean) / kPixels};
+  };
+  const Estimate independent = estimate(SamplerKind::kIndependent);
+  ASSERT_LT(std::sqrt(independent.variance), 0.01 * independent.mean) << "too noisy to tell";
+  for (const SamplerKind kind : {SamplerKind::kSobol, SamplerKind::kBlueNoise}) {
+    // Pixels of the blue noise are not independent: their mean is better than `variance` says, never worse.
+    const Estimate even = estimate(kind);
+    EXPECT_NEAR(even.mean, independent.mean, 4 * std::sqrt(even.variance + independent.variance));
+    EXPECT_LT(even.variance, 0.7 * independent.variance) << "what it is for";
+  }
+}
+
 TEST(LightTransport, APointLightFollowsTheInverseSquare) {
   ShadingScene s = floor_scene(1, 1, 1, false);
   for (const float height : {0.5f, 2.0f, 30.0f}) {

@@ -312,7 +312,7 @@ struct LitFloor : ShadingScene {
   }
 };
 
-TEST(LightTree, PicturesHaveTheMeanOfSamplingByPower) {
+TEST(LightTree, PicturesHaveTheMeanOfSamplingByPowerAndUniformly) {
   struct Estimate {
     double mean = 0, variance = 0;
   };
@@ -338,6 +338,9 @@ TEST(LightTree, PicturesHaveTheMeanOfSamplingByPower) {
     return all;
   };
   const Estimate tree = estimate(LightChoice::kTree, 1), power = estimate(LightChoice::kPower, 2);
+  const Estimate uniform = estimate(LightChoice::kUniform, 3);
+  EXPECT_NEAR(uniform.mean, tree.mean, 4 * std::sqrt(tree.variance + uniform.variance));
+  EXPECT_LT(std::sqrt(uniform.variance), 0.02 * tree.mean) << "too noisy to tell";
   EXPECT_GT(tree.mean, 0.05);
   EXPECT_NEAR(tree.mean, power.mean, 4 * std::sqrt(tree.variance + power.variance));
   EXPECT_LT(std::sqrt(tree.variance), 0.02 * tree.mean) << "too noisy to tell";

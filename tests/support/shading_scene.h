@@ -104,7 +104,8 @@ class ShadingScene {
     auto made = ShadingTables::create(files, scene, options);
     ASSERT_TRUE(made.ok()) << made.error().message;
     tables = std::move(made).value();
-    shader = std::make_unique<Shader>(scene, *tables, options, *cache);
+    const Sampler sampler(options.sampler, options.seed, 1024, 1024, 1024);
+    shader = std::make_unique<Shader>(scene, *tables, options, sampler, *cache);
   }
 
   Ray trace(const Vec3& origin, const Vec3& direction, float t_max, bool any_hit) const {
