@@ -62,6 +62,7 @@ int run_build(const BuildArguments& arguments, Console& console) {
   }
   if (arguments.consume) console.info(fmt::format("{} of the source given back", format_bytes(r.consumed_bytes)));
   if (r.degenerate_count > 0) console.info(fmt::format("{} degenerate triangles skipped", r.degenerate_count));
+  if (r.zero_area_count > 0) console.info(fmt::format("{} triangles have no area", r.zero_area_count));
   return 0;
 }
 

@@ -91,9 +91,8 @@ int run_render(const Arguments& arguments, Console& console) {
   if (!written.ok()) return console.error(written.error());
   if (arguments.has_time_limit) console.info(describe_samples(result.value().samples));
   console.info(fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds));
-  if (result.value().counters.invalid_samples_count > 0) {
-    console.warning(fmt::format("{} contributions were not finite and were dropped",
-                                result.value().counters.invalid_samples_count));
+  for (const std::string& warning : number_warnings(result.value().counters, p.picture.width)) {
+    console.warning(warning);
   }
   if (console.level >= LogLevel::kInfo) {
     fmt::print("{}", traffic_table({{std::string(order_name(result.value().order.order)), &result.value()}}));

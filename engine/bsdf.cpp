@@ -25,7 +25,7 @@ float retro_reflection(float roughness, float cosine_d, float cosine_i, float co
 Bsdf::Bsdf(const MaterialSample& material, const EnergyTable* table, const Vec3& geometric_normal,
            const Vec3& shading_normal, const Vec3& wo)
     : frame_(shading_normal), geometric_normal_(geometric_normal), wo_(frame_.to_local(wo)) {
-  if (!(wo_.z > 0)) return;
+  if (!(wo_.z > kLeastViewCosine)) return;
   diffuse_ = material.base_color * (1 - material.metallic);
   const bool specular = table != nullptr && material.has_specular_lobe();
   const float specular_albedo = specular ? set_specular(material, *table) : 0.0f;
@@ -87,8 +87,9 @@ BsdfSample Bsdf::sample(float u_lobe, float u1, float u2) const {
   const Vec3 world = frame_.to_world(wi);
   if (!(glm::dot(geometric_normal_, world) > 0)) return {};
   const BsdfValue value = evaluate_local(wi);
-  // An overflow here (grazing by the last ulp) is no direction either.
-  if (!(value.pdf > 0) || !std::isfinite(value.pdf)) return {};
+  // An overflow here (grazing by the last ulp) is no direction either, but it is counted.
+  if (!std::isfinite(value.pdf)) return {.finite = false};
+  if (!(value.pdf > 0)) return {};
   return {world, value.value / value.pdf, value.pdf};
 }
 

@@ -38,6 +38,7 @@ struct BsdfSample {
   Vec3 direction{0};  ///< world space, unit length
   Vec3 weight{0};     ///< value / pdf
   float pdf = 0;      ///< 0: no direction, the path ends
+  bool finite = true;  ///< false: it ends because its density is no number
 };
 
 class Bsdf {

@@ -35,6 +35,7 @@ class GatherPass : public BlockTaker {
     soup_.material.insert(soup_.material.end(), from.material.begin(), from.material.end());
     soup_.corners.insert(soup_.corners.end(), from.corners.begin(), from.corners.end());
     output_.degenerate_count += block.triangles.degenerate_count;
+    output_.zero_area_count += block.triangles.zero_area_count;
     for (Emitter& emitter : collect_emitters(from, input_.materials)) output_.emitters.push_back(emitter);
     input_.progress("reading", block.read_count);
     return {};
@@ -141,6 +142,7 @@ class ChunkBuilder {
     SHOAL_RETURN_IF_ERROR(source.stream(true, sort));
     SHOAL_RETURN_IF_ERROR(writer.finish());
     output_.degenerate_count += sort.unread_count();
+    output_.zero_area_count += sort.zero_area_count();
     degenerate_count_ += sort.degenerate_count();
     give_back_freed_memory();
     return build_chunks(writer, routing, level);

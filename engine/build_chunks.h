@@ -40,6 +40,7 @@ struct ObjectBuildOutput {
   BuiltObject object;
   std::vector<Emitter> emitters;  ///< object space, in order of primitive
   uint64_t degenerate_count = 0;  ///< left out while reading; object.degenerate_count counts others
+  uint64_t zero_area_count = 0;   ///< stored
   uint64_t chunks_count = 0;      ///< 0: it was built at once
   PositionGrid grid;              ///< that its positions were rounded to
   uint64_t scratch_written_bytes = 0, scratch_read_bytes = 0;

@@ -76,6 +76,7 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
   json["triangles_count"] = header.triangles_count;
   json["instanced_triangles_count"] = header.instanced_triangles_count;
   json["degenerate_count"] = header.degenerate_count;
+  json["zero_area_count"] = report.zero_area_count;
   json["objects_count"] = report.objects_count;
   json["instances_count"] = report.instances_count;
   json["treelets_count"] = report.treelets_count;

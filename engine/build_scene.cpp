@@ -223,6 +223,7 @@ class SceneBuilder {
     report_.source_read_bytes += source.read_bytes();
     report_.triangles_count += built.object.triangles_count;
     report_.degenerate_count += built.degenerate_count + built.object.degenerate_count;
+    report_.zero_area_count += built.zero_area_count;
     report_.sah_cost += built.object.sah_cost;
     report_.chunks_count += built.chunks_count;
     report_.scratch_written_bytes += built.scratch_written_bytes;

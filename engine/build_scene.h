@@ -42,6 +42,7 @@ struct SceneBuildOptions {
 
 struct SceneBuildReport {
   uint64_t triangles_count = 0, instanced_triangles_count = 0, degenerate_count = 0;
+  uint64_t zero_area_count = 0;  ///< of triangles_count: three corners in a line, met by rays edge on at most
   uint64_t treelets_count = 0, instances_count = 0, objects_count = 0;
   uint64_t file_bytes = 0, geometry_bytes = 0, source_read_bytes = 0;
   uint64_t chunks_count = 0;  ///< that objects which did not fit were built in

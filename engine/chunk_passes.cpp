@@ -65,6 +65,7 @@ void SortPass::prepare(StreamBlock& block) const {
 Status SortPass::take(StreamBlock& block) {
   const TriangleSoup& soup = block.triangles.soup;
   unread_count_ += block.triangles.degenerate_count;
+  zero_area_count_ += block.triangles.zero_area_count;
   if (emitters_ != nullptr) {  // a block has one material
     for (Emitter& emitter : collect_emitters(soup, materials_)) emitters_->push_back(emitter);
   }

@@ -68,6 +68,8 @@ class SortPass : public BlockTaker {
   /// Left out by the reader, and by the builder's own test.
   uint64_t unread_count() const { return unread_count_; }
   uint64_t degenerate_count() const { return degenerate_count_; }
+  /// Among those that are stored; 0 where they were read before.
+  uint64_t zero_area_count() const { return zero_area_count_; }
 
  private:
   const PartRouting& routing_;
@@ -76,7 +78,7 @@ class SortPass : public BlockTaker {
   std::vector<Emitter>* emitters_;
   const TrianglesDone& done_;
   const std::function<Status(const PrimitiveSource&)>* source_done_;
-  uint64_t unread_count_ = 0, degenerate_count_ = 0, stored_count_ = 0;
+  uint64_t unread_count_ = 0, degenerate_count_ = 0, zero_area_count_ = 0, stored_count_ = 0;
 };
 
 /// The records of a chunk as a source: one that has to be cut again.

@@ -35,6 +35,18 @@ void RenderCounters::add(const RenderCounters& other) {
   for (size_t kind = 0; kind < rays.size(); ++kind) {
     for (size_t bounce = 0; bounce < kCountedBounces; ++bounce) rays[kind][bounce].add(other.rays[kind][bounce]);
   }
+  first_invalid = std::min(first_invalid, other.first_invalid);
+}
+
+void RenderCounters::take(const InvalidSamples& invalid) {
+  invalid_samples_count += invalid.total();
+  invalid_emission_count += invalid.of(InvalidTerm::kEmission);
+  invalid_environment_count += invalid.of(InvalidTerm::kEnvironment);
+  invalid_light_count += invalid.of(InvalidTerm::kLight);
+  invalid_surface_count += invalid.of(InvalidTerm::kSurface);
+  invalid_bounce_count += invalid.of(InvalidTerm::kBounce);
+  invalid_path_count += invalid.of(InvalidTerm::kPath);
+  first_invalid = std::min(first_invalid, invalid.first);
 }
 
 RayCounters RenderCounters::total() const {
@@ -85,6 +97,9 @@ Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
       expect_equal("samples_committed_count", c.samples_committed_count, "samples asked for", samples_expected));
   SHOAL_RETURN_IF_ERROR(
       expect_equal("camera rays_traced_count", camera.rays_traced_count, "samples asked for", samples_expected));
+  SHOAL_RETURN_IF_ERROR(expect_equal("invalid_samples_count", c.invalid_samples_count, "the sum of its terms",
+                                     c.invalid_emission_count + c.invalid_environment_count + c.invalid_light_count +
+                                         c.invalid_surface_count + c.invalid_bounce_count + c.invalid_path_count));
   const uint64_t vertices =
       c.of_kind(RayKind::kCamera).ray_hits_count + c.of_kind(RayKind::kBounce).ray_hits_count;
   return expect_equal("vertices_shaded_count", c.vertices_shaded_count, "hits of camera and bounce rays", vertices);

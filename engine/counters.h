@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/invalid_samples.h"
 #include "io/result.h"
 
 namespace shoal {
@@ -41,7 +42,13 @@ namespace shoal {
   X(texture_tiles_pinned_count, "tiles", "changes from a texture tile to another, a thread at a time")         \
   X(coverage_tests_count, "tests", "alpha coverage tests in traversal")                                       \
   X(clamped_samples_count, "samples", "contributions lowered to --clamp-direct or --clamp-indirect")           \
-  X(invalid_samples_count, "samples", "contributions that were not finite: dropped")                          \
+  X(invalid_samples_count, "samples", "contributions that were not finite: dropped; the sum of the next six")   \
+  X(invalid_emission_count, "samples", "of those, emission that a path met")                                  \
+  X(invalid_environment_count, "samples", "of those, the environment that a path met")                        \
+  X(invalid_light_count, "samples", "of those, light samples")                                                \
+  X(invalid_surface_count, "samples", "of those, surfaces whose colour, normal or lobes were not finite")     \
+  X(invalid_bounce_count, "samples", "of those, bounces: the path ended")                                     \
+  X(invalid_path_count, "samples", "of those, sums of whole paths")                                           \
   X(film_saturated_count, "samples", "contributions too large for the film: clamped")
 
 // Counters kept for each kind of ray and each bounce.
@@ -71,8 +78,11 @@ struct RenderCounters {
 #undef SHOAL_DECLARE
   /// [kind][bounce]: totals, sums by kind and by bounce all come from this one table.
   std::array<std::array<RayCounters, kCountedBounces>, 3> rays;
+  InvalidPlace first_invalid;  ///< where the first of the invalid samples was
 
   void add(const RenderCounters& other);
+  /// Puts what is not finite into its counters.
+  void take(const InvalidSamples& invalid);
   RayCounters total() const;
   RayCounters of_kind(RayKind kind) const;
   RayCounters of_bounce(uint32_t bounce) const;

@@ -6,9 +6,6 @@
 
 namespace shoal {
 
-namespace {
-
-/// In double, where the products of floats neither overflow nor vanish.
 bool has_area(const float* p) {
   double e[2][3];
   for (int c = 0; c < 3; ++c) {
@@ -23,8 +20,6 @@ bool has_area(const float* p) {
   }
   return false;
 }
-
-}  // namespace
 
 std::vector<Emitter> collect_emitters(const TriangleSoup& soup, std::span<const Material> materials) {
   std::vector<Emitter> emitters;

@@ -14,6 +14,9 @@ namespace shoal {
 /// 72 bytes each, resident while rendering: more is refused.
 inline constexpr uint64_t kMaxEmitters = 1u << 25;
 
+/// Of a triangle with these nine floats; in double, where the products of floats neither overflow nor vanish.
+bool has_area(const float* p);
+
 /// The emissive triangles of an object, in object space, in order of primitive; instance is 0.
 std::vector<Emitter> collect_emitters(const TriangleSoup& soup, std::span<const Material> materials);
 

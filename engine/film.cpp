@@ -21,7 +21,12 @@ FixedPoint128 FixedPoint128::from_float(float value) {
   return {static_cast<int64_t>(fixed >> 64), static_cast<uint64_t>(fixed)};
 }
 
-double FixedPoint128::to_double() const { return static_cast<double>(high) + static_cast<double>(low) * 0x1p-64; }
+double FixedPoint128::to_double() const {
+  // A small negative number is -1 and nearly 1: its digits would be lost.
+  const FixedPoint128 positive{-high - (low != 0 ? 1 : 0), 0 - low};
+  if (high < 0) return -positive.to_double();
+  return static_cast<double>(high) + static_cast<double>(low) * 0x1p-64;
+}
 
 Film::Film(uint32_t width, uint32_t height)
     : width_(width),

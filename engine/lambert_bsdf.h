@@ -16,7 +16,7 @@ class LambertBsdf {
       : frame_(shading_normal),
         geometric_normal_(geometric_normal),
         color_(color),
-        black_(!(frame_.to_local(wo).z > 0) || !(luminance(color) > 0)) {}
+        black_(!(frame_.to_local(wo).z > kLeastViewCosine) || !(luminance(color) > 0)) {}
 
   bool black() const { return black_; }
   BsdfValue evaluate(const Vec3& wi) const {

@@ -27,7 +27,7 @@ LayeredBsdf::LayeredBsdf(const LayeredSample& m, const LobeTables& tables, const
       disperses_(m.disperses),
       wavelength_weight_(m.wavelength_weight) {
   set_frame(m, wo);
-  if (!(wo_.z > 0)) return;
+  if (!(wo_.z > kLeastViewCosine)) return;
   diffuse_ = m.base_color * (1 - m.metallic);
   float rest = 1;
   if (tables.energy != nullptr && m.has_specular_lobe()) rest = set_specular(m, tables);
@@ -132,7 +132,7 @@ void LayeredBsdf::set_coats(const LayeredSample& m, const LobeTables& tables, co
   if (m.clearcoat > 0) {
     coat_frame_ = Frame(m.clearcoat_normal);
     coat_wo_ = coat_frame_.to_local(wo);
-    if (coat_wo_.z > 0) {
+    if (coat_wo_.z > kLeastViewCosine) {
       coat_ggx_.alpha = to_alpha(m.clearcoat_roughness);
       coat_lambda_o_ = coat_ggx_.lambda(coat_wo_);
       const SpecularAlbedo e = tables.energy->albedo(std::min(coat_wo_.z, 1.0f), coat_ggx_.alpha);
@@ -339,8 +339,9 @@ BsdfSample LayeredBsdf::sample(float u_lobe, float u1, float u2) const {
   const Direction direction = sample_lobe(u_lobe, u1, u2);
   if (direction.world == Vec3(0)) return {};
   const BsdfValue value = evaluate_world(direction.world, direction.local);
-  // An overflow here (grazing by the last ulp) is no direction either.
-  if (!(value.pdf > 0) || !std::isfinite(value.pdf)) return {};
+  // An overflow here (grazing by the last ulp) is no direction either, but it is counted.
+  if (!std::isfinite(value.pdf)) return {.finite = false};
+  if (!(value.pdf > 0)) return {};
   return {direction.world, value.value / value.pdf, value.pdf};
 }
 

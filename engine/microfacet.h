@@ -15,6 +15,10 @@ namespace shoal {
 /// below a pixel of a 1000-pixel, 60 degree picture, so that it still looks like a mirror.
 inline constexpr float kMinAlpha = 1e-3f;
 
+/// A view that grazes by less sees nothing of a surface: its cosine is noise (unit vectors of floats are off by 2^-23),
+/// and Lambda and densities that divide by it would leave the range of floats.
+inline constexpr float kLeastViewCosine = 0x1p-40f;
+
 struct Ggx {
   float alpha;
 

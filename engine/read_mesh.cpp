@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "engine/emitters.h"
 #include "engine/vertex_pose.h"
+#include "treelets/triangle_refs.h"
 
 namespace shoal {
 
@@ -146,6 +148,8 @@ void PrimitiveReader::State::append(const uint32_t* corners, uint32_t id, Triang
   const size_t at = soup.positions.size();
   soup.positions.resize(at + 9);
   for (int k = 0; k < 3; ++k) std::copy_n(p[k], 3, &soup.positions[at + 3 * static_cast<size_t>(k)]);
+  const float* stored = &soup.positions[at];
+  if (!has_area(stored) && !is_degenerate(stored)) ++block.zero_area_count;
   soup.primitive.push_back(id);
   soup.material.push_back(material);
   if (layout.floats() == 0) return;
@@ -202,7 +206,7 @@ void TriangleBlock::clear(CornerLayout layout, uint64_t expected) {
   soup.primitive.reserve(expected);
   soup.material.reserve(expected);
   soup.corners.reserve(3 * expected * layout.floats());
-  degenerate_count = 0;
+  degenerate_count = zero_area_count = 0;
 }
 
 uint64_t PrimitiveReader::memory_bytes(CornerLayout layout, uint32_t pose_windows) {

@@ -33,6 +33,7 @@ CornerLayout united(const CornerLayout& a, const CornerLayout& b);
 struct TriangleBlock {
   TriangleSoup soup;
   uint64_t degenerate_count = 0;  ///< left out: a corner not finite, or two corners in one place
+  uint64_t zero_area_count = 0;   ///< in the soup: three corners in a line
 
   void clear(CornerLayout layout, uint64_t expected);
 };

@@ -11,6 +11,7 @@
 #include "engine/accuracy_names.h"
 #include "engine/camera.h"
 #include "engine/effects.h"
+#include "engine/film.h"
 #include "engine/process_memory.h"
 
 namespace shoal {
@@ -183,6 +184,16 @@ void add_accuracy(const ShadingOptions& shading, ExrImage& image) {
   image.numbers["clampIndirect"] = shading.clamp_indirect;
 }
 
+Json invalid_json(const RenderCounters& counters, uint32_t width) {
+  const InvalidPlace& at = counters.first_invalid;
+  if (at.pixel == kNoIndex) return nullptr;
+  return {{"term", kInvalidTermNames[static_cast<size_t>(at.term)]},
+          {"x", at.pixel % width},
+          {"y", at.pixel / width},
+          {"sample", at.sample},
+          {"vertex", at.bounce}};
+}
+
 }  // namespace
 
 std::string format_bytes(uint64_t bytes) {
@@ -276,11 +287,35 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["phases"] = phases_json(result.phases);
   json["rays_per_second"] = static_cast<double>(rays.rays_traced_count) / result.seconds;
   json["counters"] = Json::parse(counters_json(result.counters));
+  json["first_invalid"] = invalid_json(result.counters, picture.width);
   Json& units = json["counter_list"] = Json::array();
   for (const CounterInfo& info : counter_list()) {
     units.push_back({{"name", info.name}, {"unit", info.unit}, {"meaning", info.sentence}});
   }
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::vector<std::string> number_warnings(const RenderCounters& c, uint32_t width) {
+  std::vector<std::string> warnings;
+  if (c.invalid_samples_count > 0) {
+    const uint64_t counts[] = {c.invalid_emission_count, c.invalid_environment_count, c.invalid_light_count,
+                               c.invalid_surface_count,  c.invalid_bounce_count,      c.invalid_path_count};
+    static_assert(std::size(counts) == kInvalidTermNames.size());
+    std::string terms;
+    for (size_t i = 0; i < std::size(counts); ++i) {
+      if (counts[i] > 0) terms += fmt::format("{}{} {}", terms.empty() ? "" : ", ", kInvalidTermNames[i], counts[i]);
+    }
+    const InvalidPlace& at = c.first_invalid;
+    warnings.push_back(fmt::format(
+        "{} contributions were not finite and were dropped ({}); the first: {}, pixel ({}, {}), sample {}, vertex {}",
+        c.invalid_samples_count, terms, kInvalidTermNames[static_cast<size_t>(at.term)], at.pixel % width,
+        at.pixel / width, at.sample, at.bounce));
+  }
+  if (c.film_saturated_count > 0) {
+    warnings.push_back(fmt::format("{} samples were brighter than {:.2g} and were clamped to it",
+                                   c.film_saturated_count, Film::kMaxRadiance));
+  }
+  return warnings;
 }
 
 std::string traffic_table(const std::vector<TrafficColumn>& columns) {

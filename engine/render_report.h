@@ -25,6 +25,10 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
 /// Processor, memory and system as that document has them, JSON text.
 std::string machine_description();
 
+/// What of a picture `width` pixels wide was not a number, or too large for the film, a sentence each: of which terms, and
+/// where first. Empty of nearly all pictures.
+std::vector<std::string> number_warnings(const RenderCounters& counters, uint32_t width);
+
 /// One column of the traffic table.
 struct TrafficColumn {
   std::string title;

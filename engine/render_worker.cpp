@@ -205,7 +205,7 @@ void RenderWorker::end_path(const PathState& path) {
   Vec3 radiance = path.radiance;
   if (!std::isfinite(radiance.x) || !std::isfinite(radiance.y) || !std::isfinite(radiance.z)) {
     radiance = Vec3(0);
-    ++counters_.invalid_samples_count;
+    invalid_.add(InvalidTerm::kPath, path);
   }
   if (aovs_ != nullptr) end_features(path, radiance);
   if (!context_.film.add(path.pixel, radiance, (path.flags & kPathCovered) != 0)) ++counters_.film_saturated_count;
@@ -317,7 +317,8 @@ void RenderWorker::hand_in() {
   c.texture_lookups_count = shade_counters_.texture_lookups_count;
   c.texture_tiles_pinned_count = shader_.texture_tiles_pinned_count();
   c.clamped_samples_count = shade_counters_.clamped_samples_count;
-  c.invalid_samples_count += shade_counters_.invalid_samples_count;
+  c.take(shade_counters_.invalid);
+  c.take(invalid_);
   std::lock_guard guard(context_.mutex);
   context_.counters.add(c);
 }

@@ -186,6 +186,7 @@ class RenderWorker {
   CacheCounters cache_counters_;
   TraceCounters trace_counters_;
   ShadeCounters shade_counters_;
+  InvalidSamples invalid_;  ///< of what the shader did not see
   AovFilm *aovs_ = nullptr, *visits_aovs_ = nullptr, *loads_aovs_ = nullptr;  ///< where such AOVs are asked for
   bool seeks_ = false;          ///< paths begin with PathState::seeks
   uint64_t charged_bytes_ = 0;  ///< of cache_counters_.decoded_bytes

@@ -1,11 +1,26 @@
 // The part of the render worker that AOVs call for: nothing here runs in a render without them.
+#include <cmath>
+
 #include "engine/aov_film.h"
 #include "engine/render_worker.h"
 
 namespace shoal {
+namespace {
+
+bool finite(const SurfaceFeatures& f) {
+  const auto numbers = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
+  return numbers(f.position) && numbers(f.normal) && numbers(f.albedo) && !std::isnan(f.distance);
+}
+
+}  // namespace
 
 void RenderWorker::note_features(PathState& path, uint32_t bounce, bool goes_on) {
-  const SurfaceFeatures& features = shader_.features();
+  SurfaceFeatures features = shader_.features();
+  if (!finite(features)) {
+    invalid_.add(InvalidTerm::kSurface, path);
+    features.position = features.normal = features.albedo = Vec3(0);
+    features.distance = 0;
+  }
   if (bounce == 0) {
     aovs_->add_first_hit(path.pixel, features);
     if (path.sample == 0) aovs_->set_ids(path.pixel, path.hit, features.material);

@@ -27,6 +27,20 @@ constexpr float kMinSurvival = 0.05f;
 
 bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
+/// A surface that scatters nothing because some of its values are no numbers.
+void count_invalid_surface(const MaterialSample& values, const Vec3& normal, const PathState& path,
+                           ShadeCounters& counters) {
+  const bool numbers = finite(values.base_color) && finite(values.specular_color) && finite(normal) &&
+                       std::isfinite(values.roughness + values.metallic + values.specular);
+  if (!numbers) counters.invalid.add(InvalidTerm::kSurface, path);
+}
+
+/// Also of what is so large or small that its squares are no floats.
+float distance_of(const Vec3& a, const Vec3& b) {
+  const float length = glm::length(a - b);
+  return length > 0x1p-60f && length < 0x1p60f ? length : static_cast<float>(glm::length(glm::dvec3(a) - glm::dvec3(b)));
+}
+
 /// Two words as one number in [0, 1): enough digits to choose among any number of emitters.
 double uniform53(uint32_t high, uint32_t low) {
   return static_cast<double>((static_cast<uint64_t>(high) << 32 | low) >> 11) * 0x1p-53;
@@ -71,17 +85,18 @@ Shader::Shader(const Scene& scene, const ShadingTables& tables, const ShadingOpt
       textures_(scene.textures, cache),
       follows_cones_(!kOnlyLambert && wants_cones(scene, options)) {}
 
-void Shader::add_light(Vec3& sum, Vec3 term, uint32_t scatterings, ShadeCounters& counters) const {
-  if (!finite(term)) {
-    ++counters.invalid_samples_count;
+void Shader::add_light(Vec3& sum, Vec3 light, uint32_t scatterings, InvalidTerm term, const PathState& path,
+                       ShadeCounters& counters) const {
+  if (!finite(light)) {
+    counters.invalid.add(term, path);
     return;
   }
   const float limit = scatterings > 1 ? options_->clamp_indirect : options_->clamp_direct;
-  if (limit > 0 && scatterings > 0 && max_component(term) > limit) {
-    term *= limit / max_component(term);  // all channels alike: the hue stays
+  if (limit > 0 && scatterings > 0 && max_component(light) > limit) {
+    light *= limit / max_component(light);  // all channels alike: the hue stays
     ++counters.clamped_samples_count;
   }
-  sum += term;
+  sum += light;
 }
 
 Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
@@ -125,10 +140,13 @@ Status Shader::shade_hit(PathState& path, std::span<const std::byte> geometry,
   SHOAL_ASSIGN_OR_RETURN(const MaterialSample values, sample_material(material, surface, textures));
   SHOAL_ASSIGN_OR_RETURN(const Vec3 normal, sample_normal(material, surface, textures, mapped));
   const Bsdf bsdf(values, tables_->impl().energy_table(), surface.geometric_normal, normal, surface.wo);
-  if (bsdf.black()) return {};
+  if (bsdf.black()) {
+    count_invalid_surface(values, normal, path, counters);
+    return {};
+  }
   const Sides media{path.medium & kPathMediumMask, 0};
   SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
-  sample_bounce(path, surface, bsdf, media, result);
+  sample_bounce(path, surface, bsdf, media, result, counters);
   return {};
 }
 
@@ -138,10 +156,13 @@ Status Shader::shade_lambert(PathState& path, const Surface& surface, const Mate
   const Vec3 color = glm::clamp(factor * (textures.vertex_colors ? Vec3(surface.color()) : Vec3(1)), 0.0f, 1.0f);
   const Vec3 normal = facing_normal(surface, surface.front_normal);
   const LambertBsdf bsdf(color, surface.geometric_normal, normal, surface.wo);
-  if (bsdf.black()) return {};
+  if (bsdf.black()) {
+    count_invalid_surface({.base_color = color}, normal, path, counters);
+    return {};
+  }
   const Sides media{path.medium & kPathMediumMask, 0};
   SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
-  sample_bounce(path, surface, bsdf, media, result);
+  sample_bounce(path, surface, bsdf, media, result, counters);
   return {};
 }
 
@@ -154,7 +175,7 @@ TextureContext Shader::context(ShadeCounters& counters, CacheCounters& cache_cou
 
 TextureFootprint Shader::reach(PathState& path, const Surface& surface) const {
   const RayCone cone = unpack_cone(path.cone);
-  const float width = cone.width + cone.spread * glm::length(surface.position.point - path.origin);
+  const float width = cone.width + cone.spread * distance_of(surface.position.point, path.origin);
   path.cone = pack_cone({width, cone.spread});
   return {surface, width, random(path, Dimension::kTexture).uniform(0)};
 }
@@ -176,7 +197,7 @@ Status Shader::add_emission(PathState& path, const Surface& surface, const Mater
     const double cosine = glm::dot(surface.geometric_normal, surface.wo);
     weight = cosine > 0 ? mis_weight(path.bsdf_pdf, area_pdf * glm::dot(along, along) / cosine) : 0.0f;
   }
-  add_light(path.radiance, path.throughput * emission * weight, path.bounce, counters);
+  add_light(path.radiance, path.throughput * emission * weight, path.bounce, InvalidTerm::kEmission, path, counters);
   return {};
 }
 
@@ -193,7 +214,10 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
   const LightSample light =
       lights.sample(surface.position.point, receiver,
                     {uniform53(drawn.bits[0], drawn.bits[3]), drawn.uniform(1), drawn.uniform(2)}, time_of(path));
-  if (!(light.pdf > 0)) return {};
+  if (!(light.pdf > 0)) {
+    if (std::isnan(light.pdf)) counters.invalid.add(InvalidTerm::kLight, path);
+    return {};
+  }
   const BsdfValue f = bsdf.evaluate(light.direction);
   if (f.value == Vec3(0)) return {};
 
@@ -208,11 +232,11 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
   const Vec3 side = side_of<AnyBsdf>(surface.geometric_normal, light.direction);
   const uint32_t medium = side == surface.geometric_normal ? media.above : media.below;
   if (medium != 0 && !light.at_infinity) {
-    radiance *= transmittance(medium, glm::length(light.target.point - surface.position.point));
+    radiance *= transmittance(medium, distance_of(light.target.point, surface.position.point));
   }
   const float weight = light.delta ? 1.0f : mis_weight(light.pdf, f.pdf);
   add_light(path.shadow_radiance, path.throughput * f.value * radiance * static_cast<float>(weight / light.pdf),
-            path.bounce + 1, counters);
+            path.bounce + 1, InvalidTerm::kLight, path, counters);
   if (path.shadow_radiance == Vec3(0)) return {};
 
   result.has_shadow = true;
@@ -231,12 +255,13 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
 
 template <class AnyBsdf>
 void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
-                           ShadeResult& result) const {
+                           ShadeResult& result, ShadeCounters& counters) const {
   // After the last scattering a bounce can only find emission.
   if (path.bounce + 1 >= options_->bounces && !tables_->impl().lights_hit_by_chance) return;
   const Random4 drawn = random(path, Dimension::kBsdf);
   const BsdfSample sample = bsdf.sample(drawn.uniform(0), drawn.uniform(1), drawn.uniform(2));
   Vec3 throughput = path.throughput * sample.weight;
+  if (!sample.finite || !finite(throughput)) counters.invalid.add(InvalidTerm::kBounce, path);
   if (!(sample.pdf > 0) || !finite(throughput) || throughput == Vec3(0)) return;
   if (path.bounce >= options_->roulette_start) {
     const float survival = std::clamp(max_component(throughput), kMinSurvival, 1.0f);
@@ -267,13 +292,14 @@ const MaterialLayers& Shader::layers_of(const Material& material) const {
 Status Shader::add_unlit(PathState& path, const Surface& surface, const Material& material, TextureContext& textures,
                          ShadeCounters& counters) {
   SHOAL_ASSIGN_OR_RETURN(const Vec3 color, sample_base_color(material, surface, textures));
-  add_light(path.radiance, path.throughput * color, path.bounce, counters);
+  add_light(path.radiance, path.throughput * color, path.bounce, InvalidTerm::kEmission, path, counters);
   return {};
 }
 
 Vec3 Shader::transmittance(uint32_t medium, float distance) const {
   const float* absorption = layers_of(materials_[medium - 1]).absorption;
-  return {exp2_of(absorption[0] * distance), exp2_of(absorption[1] * distance), exp2_of(absorption[2] * distance)};
+  const auto passes = [&](int c) { return absorption[c] == 0 ? 1.0f : exp2_of(absorption[c] * distance); };
+  return {passes(0), passes(1), passes(2)};
 }
 
 void Shader::absorb(PathState& path, const Surface& surface, uint32_t material, uint32_t effects) const {
@@ -283,7 +309,7 @@ void Shader::absorb(PathState& path, const Surface& surface, uint32_t material, 
       layers_of(materials_[material]).volume != 0) {
     path.medium = medium = material + 1;
   }
-  if (medium != 0) path.throughput *= transmittance(medium, glm::length(surface.position.point - path.origin));
+  if (medium != 0) path.throughput *= transmittance(medium, distance_of(surface.position.point, path.origin));
 }
 
 void Shader::disperse(const PathState& path, const MaterialLayers& layers, LayeredSample& values) const {
@@ -308,14 +334,17 @@ Status Shader::shade_layers(PathState& path, const Surface& surface, const Mater
   if ((effects & kEffectDispersion) != 0) disperse(path, layers, values);
 
   const LayeredBsdf bsdf(values, tables_->impl().lobe_tables(), surface.geometric_normal, normal, surface.wo);
-  if (bsdf.black()) return {};
+  if (bsdf.black()) {
+    count_invalid_surface(values, normal, path, counters);
+    return {};
+  }
   const uint32_t medium = path.medium & kPathMediumMask, inside = surface.attributes.material + 1;
   Sides media{medium, medium};
   if (values.volume && (values.transmission > 0 || values.diffuse_transmission > 0)) {
     media = values.outside ? Sides{medium, inside} : Sides{inside, 0};
   }
   SHOAL_RETURN_IF_ERROR(sample_light(path, surface, bsdf, media, result, textures, counters));
-  sample_bounce(path, surface, bsdf, media, result);
+  sample_bounce(path, surface, bsdf, media, result, counters);
   return {};
 }
 
@@ -325,7 +354,8 @@ void Shader::shade_miss(PathState& path, ShadeCounters& counters) {
   const Vec3 direction = glm::normalize(path.direction);
   float weight = 1;
   if (path.bsdf_pdf > 0) weight = mis_weight(path.bsdf_pdf, tables.lights->environment_pdf(direction));
-  add_light(path.radiance, path.throughput * tables.environment.radiance(direction) * weight, path.bounce, counters);
+  add_light(path.radiance, path.throughput * tables.environment.radiance(direction) * weight, path.bounce,
+            InvalidTerm::kEnvironment, path, counters);
 }
 
 }  // namespace shoal

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "engine/effects.h"
+#include "engine/invalid_samples.h"
 #include "engine/light_choice.h"
 #include "engine/path_state.h"
 #include "engine/sampler.h"
@@ -87,7 +88,7 @@ struct ShadeCounters {
   uint64_t vertices_shaded_count = 0;
   uint64_t texture_lookups_count = 0;
   uint64_t clamped_samples_count = 0;  ///< contributions that were lowered to a limit
-  uint64_t invalid_samples_count = 0;  ///< contributions that were not finite: dropped, counted, reported
+  InvalidSamples invalid;  ///< what was not finite: dropped, counted, reported
 };
 
 class Shader {
@@ -136,11 +137,12 @@ class Shader {
                       ShadeResult& result, const TextureContext& vertex, ShadeCounters& counters);
   template <class AnyBsdf>
   void sample_bounce(PathState& path, const Surface& surface, const AnyBsdf& bsdf, const Sides& media,
-                     ShadeResult& result) const;
+                     ShadeResult& result, ShadeCounters& counters) const;
   Status note_features(const PathState& path, const Surface& surface, const Material& material, uint32_t effects,
                        TextureContext& textures);
   /// Adds light that was scattered so often; clamped, or dropped if it is not finite, and counted.
-  void add_light(Vec3& sum, Vec3 term, uint32_t scatterings, ShadeCounters& counters) const;
+  void add_light(Vec3& sum, Vec3 light, uint32_t scatterings, InvalidTerm term, const PathState& path,
+                 ShadeCounters& counters) const;
   /// Of the vertex that is shaded.
   Random4 random(const PathState& path, Dimension dimension) const {
     return sampler_.draw(path.pixel, path.sample, path.bounce, dimension);

@@ -72,4 +72,13 @@ Vec3 offset_point(const BoundedPoint& p, const Vec3& normal) {
   return moved;
 }
 
+float offset_reach(const BoundedPoint& p, const Vec3& normal) {
+  const Vec3 n = glm::abs(normal);
+  const float error = glm::dot(n, p.error);
+  // The point may lie above the surface by its error, and is moved by as much. Each coordinate is rounded once and then
+  // moved by one number: a half and one unit in the last place, 3 u of it. Roundings of all this: gamma(8).
+  const float moved = glm::dot(n, glm::abs(p.point) + error * n);
+  return (1 + gamma_bound(8)) * (2 * error + gamma_bound(3) * moved) + 3 * std::numeric_limits<float>::denorm_min();
+}
+
 }  // namespace shoal

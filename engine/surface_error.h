@@ -36,4 +36,8 @@ BoundedPoint ray_end(const BoundedPoint& target, const Vec3& origin, const Insta
 /// Moves a point along `normal` past its error bounds and one representable number further (PBRT 6.8.6).
 Vec3 offset_point(const BoundedPoint& p, const Vec3& normal);
 
+/// How high above the true surface offset_point() may begin, along `normal`, at most. A ray from there meets every other
+/// surface that lies farther above than this and that surface's own error; one closer may be passed over.
+float offset_reach(const BoundedPoint& p, const Vec3& normal);
+
 }  // namespace shoal

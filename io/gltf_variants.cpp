@@ -8,7 +8,8 @@
 namespace shoal::gltf {
 namespace {
 
-constexpr size_t kMaxNamedVariants = 20;  ///< in a message
+/// In a message: names are listed until there are so many or their list is so long.
+constexpr size_t kMaxNamedVariants = 20, kMaxListBytes = 160;
 
 }  // namespace
 
@@ -41,8 +42,10 @@ Status select_variant(Document& document, const std::string& name) {
   const auto at = std::find(document.variants.begin(), document.variants.end(), name);
   if (at == document.variants.end()) {
     std::string known;
-    const size_t shown = std::min(document.variants.size(), kMaxNamedVariants);
-    for (size_t i = 0; i < shown; ++i) known += (i == 0 ? "" : ", ") + printable(document.variants[i]);
+    size_t shown = 0;
+    for (; shown < std::min(document.variants.size(), kMaxNamedVariants) && known.size() < kMaxListBytes; ++shown) {
+      known += (shown == 0 ? "" : ", ") + printable(document.variants[shown]);
+    }
     if (shown < document.variants.size()) known += fmt::format(" and {} more", document.variants.size() - shown);
     return Error{ErrorCode::kUsage,
                  fmt::format("{}: no variant '{}': {}", document.path, printable(name),

@@ -296,5 +296,26 @@ TEST(RenderScene, OneTriangleWithoutCameraOrLightIsFramedUnderAConstantSky) {
   EXPECT_THAT(dark.err, HasSubstr("warning: the scene has no light and the environment is black"));
 }
 
+TEST(RenderScene, SaysWhichNumbersWereNotFiniteAndWhere) {
+  const TemporaryFolder folder;
+  WrittenScene scene = one_triangle();
+  const float most = 3e38f;  // between the corners they overflow, and zero times that is no number
+  scene.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
+      scene.add_floats(3, {-most, 1, 1, most, 1, 1, most, 1, 1});
+  scene.json["meshes"][0]["primitives"][0]["material"] = 0;
+  scene.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {0, 1, 1, 1}}}}}};
+  save(scene, folder / "scene");
+  const ProgramRun run = run_shoal(folder, join({"render", folder / "scene/scene.gltf", "-o", folder / "out.exr",
+                                                 "--stats", folder / "stats.json"}, tiny_picture()));
+  expect_exit(run, 0);
+  EXPECT_THAT(run.err, HasSubstr(" contributions were not finite and were dropped (surface "));
+  const nlohmann::json stats = nlohmann::json::parse(file_text(folder / "stats.json"));
+  EXPECT_GT(stats["counters"]["totals"]["invalid_surface_count"], 10);
+  EXPECT_EQ(stats["first_invalid"]["term"], "surface");
+  for (const ExrChannel& channel : read_picture(folder / "out.exr").channels) {
+    for (const float value : channel.values) ASSERT_TRUE(std::isfinite(value)) << channel.name;
+  }
+}
+
 }  // namespace
 }  // namespace shoal::testing

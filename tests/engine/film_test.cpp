@@ -13,6 +13,9 @@ TEST(FixedPoint128, HoldsFloatsExactlyOverItsRange) {
   for (const float value : {0.0f, 1.0f, -1.0f, 0.1f, 3.0e-10f, 1.5e10f, -2.5e-7f, 0x1p-41f, 0x1.fffffep39f}) {
     EXPECT_EQ(FixedPoint128::from_float(value).to_double(), static_cast<double>(value)) << value;
   }
+  for (const float value : {-3.0e-10f, -0x1.8p-41f, -1e10f}) {
+    EXPECT_EQ(FixedPoint128::from_float(value).to_double(), static_cast<double>(value)) << value;
+  }
   EXPECT_EQ(FixedPoint128::from_float(1e-40f).to_double(), 0.0);
 }
 

@@ -245,7 +245,11 @@ TEST(LightTransport, ContributionsThatAreNotFiniteAreDroppedAndCounted) {
   s.scene.materials[1].emissive[1] = std::numeric_limits<float>::infinity();
   s.prepare(with_bounces(2));
   for (uint32_t i = 0; i < 50; ++i) EXPECT_TRUE(std::isfinite(s.radiance(kEye, kDown, 0, i).y));
-  EXPECT_GT(s.counters.invalid_samples_count, 0);
+  const InvalidSamples& invalid = s.counters.invalid;
+  EXPECT_GT(invalid.of(InvalidTerm::kEmission), 0u);
+  EXPECT_GT(invalid.of(InvalidTerm::kLight), 0u);
+  EXPECT_EQ(invalid.total(), invalid.of(InvalidTerm::kEmission) + invalid.of(InvalidTerm::kLight));
+  EXPECT_EQ(invalid.first, (InvalidPlace{0, 0, 0, InvalidTerm::kLight})) << "of the first vertex";
 }
 
 }  // namespace

@@ -86,6 +86,18 @@ class PagePacker {
     return index;
   }
 
+  /// A chain of nodes, each with a leaf and the next node, and boxes as large as all of it. Requires: an empty page.
+  void add_chain(std::span<TestTriangle> triangles) {
+    for (size_t first = 0; first < triangles.size(); first += leaf_size_) {
+      const std::span<TestTriangle> rest = triangles.subspan(first);
+      const bool last = rest.size() <= leaf_size_;
+      QuantizedNode node = quantize(last ? std::vector{triangles} : std::vector{triangles, triangles});
+      node.child[0] = add_leaf(rest.first(std::min(leaf_size_, rest.size())));
+      if (!last) node.child[1] = static_cast<uint32_t>(nodes_.size()) + 1;
+      nodes_.push_back(node);
+    }
+  }
+
   /// Appends coverage: `record_of` a triangle's primitive (kNoIndex: opaque). Call before add().
   void set_coverage(std::vector<CoverageRecord> records, std::vector<uint8_t> texels,
                     std::function<uint32_t(uint32_t)> record_of) {
