@@ -15,15 +15,16 @@ namespace {
 
 struct Arguments {
   RenderArguments render;
-  std::string output, png, preview, stats, tonemap = "pbr-neutral";
+  std::string output, png, preview, stats, tonemap = "pbr-neutral", target_noise;
   std::vector<std::string> aovs;
   float exposure = 0;
   double time_limit = 0;
   bool has_time_limit = false;
 };
 
-/// Of a render that ends by itself, where --spp does not say: as many as a pixel can hold.
-constexpr uint32_t kMostSamples = 1u << 22;
+/// Of a render that ends by itself, where --spp does not say: as many as a pixel can hold; with --target-noise no more
+/// than what makes sense for the few pixels that never become calm.
+constexpr uint32_t kMostSamples = 1u << 22, kMostForNoise = 4096;
 
 Result<AovSet> aovs_of(const Arguments& arguments) {
   return parse_aovs(fmt::format("{}", fmt::join(arguments.aovs, ",")));
@@ -36,6 +37,7 @@ Status check_arguments(const Arguments& arguments) {
   if (!std::isfinite(arguments.exposure)) {
     return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
   }
+  if (const auto noise = parse_noise_target(arguments.target_noise); !noise.ok()) return noise.error();
   if (arguments.has_time_limit && !(arguments.time_limit > 0 && std::isfinite(arguments.time_limit))) {
     return Error{ErrorCode::kUsage, fmt::format("--time-limit {}: expected seconds, more than 0", arguments.time_limit)};
   }
@@ -77,7 +79,11 @@ int run_render(const Arguments& arguments, Console& console) {
   asked.picture.aovs = aovs_of(arguments).value();
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
   asked.execution.time_limit_seconds = arguments.time_limit;
-  if (arguments.has_time_limit && asked.samples->count() == 0) asked.picture.samples = kMostSamples;
+  asked.picture.noise = parse_noise_target(arguments.target_noise).value();
+  if (asked.samples->count() == 0) {
+    if (arguments.has_time_limit) asked.picture.samples = kMostSamples;
+    if (asked.picture.noise.asked()) asked.picture.samples = kMostForNoise;
+  }
   auto prepared = prepare_render(asked, {arguments.render.execution.order}, 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
@@ -89,7 +95,11 @@ int run_render(const Arguments& arguments, Console& console) {
   if (!result.ok()) return console.error(result.error());
   const Status written = write_outputs(arguments, p, result.value());
   if (!written.ok()) return console.error(written.error());
-  if (arguments.has_time_limit) console.info(describe_samples(result.value().samples));
+  if (arguments.has_time_limit || p.picture.noise.asked()) console.info(describe_samples(result.value()));
+  if (p.picture.noise.asked() && !(result.value().noise && result.value().noise->meets(p.picture.noise))) {
+    console.warning(fmt::format("the noise asked for ({:.3g} % at the median, {:.3g} % at the 95th percentile) was not "
+                                "reached", 100 * p.picture.noise.median, 100 * p.picture.noise.percentile_95));
+  }
   console.info(fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds));
   for (const std::string& warning : number_warnings(result.value().counters, p.picture.width)) {
     console.warning(warning);
@@ -125,6 +135,11 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
                       "seconds after which rendering ends, with the samples that fit; --spp is the most then (default: no "
                       "bound). The picture is that of --spp N for the N that is printed")
           ->type_name("SECONDS");
+  sub->add_option("--target-noise", arguments->target_noise,
+                  "samples where it is noisy, until the standard error relative to the pixel's luminance is so much at the "
+                  "median pixel and twice that at the 95th percentile, or as given: 2%, 0.02, 2%:5%. --spp is the most then "
+                  "(default: 4096); docs/adaptive_sampling.md")
+      ->type_name("M[:P]");
   sub->callback([arguments, time_limit, &console, &command] {
     arguments->has_time_limit = time_limit->count() > 0;
     command = [arguments, &console] { return run_render(*arguments, console); };

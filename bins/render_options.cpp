@@ -370,6 +370,7 @@ std::string describe_plan(const MemoryPlan& plan) {
                                  format_bytes(plan.film_bytes));
   if (plan.preview_bytes > 0) text += fmt::format(", preview {}", format_bytes(plan.preview_bytes));
   if (plan.aov_bytes > 0) text += fmt::format(", AOVs {}", format_bytes(plan.aov_bytes));
+  if (plan.noise_bytes > 0) text += fmt::format(", noise {}", format_bytes(plan.noise_bytes));
   return text + fmt::format(", {} paths in flight {} and their rays {}, page cache {} of {} (geometry {}, attributes {}, "
                             "textures {}), read buffers {}, scratch {}",
                             plan.paths_in_flight, format_bytes(plan.path_state_bytes), format_bytes(plan.ray_bytes),
@@ -379,8 +380,18 @@ std::string describe_plan(const MemoryPlan& plan) {
                             format_bytes(plan.scratch_bytes));
 }
 
-std::string describe_samples(const SampleReport& samples) {
-  return fmt::format("{} samples a pixel in {} passes", samples.most, samples.passes_count);
+std::string describe_samples(const RenderResult& result) {
+  const SampleReport& samples = result.samples;
+  std::string text = fmt::format("{} samples a pixel in {} passes", samples.most, samples.passes_count);
+  if (samples.least < samples.most) {
+    text = fmt::format("{:.1f} samples a pixel ({} to {}) in {} passes", samples.mean, samples.least, samples.most,
+                       samples.passes_count);
+  }
+  if (result.noise) {
+    text += fmt::format("; noise {:.2f} % at the median, {:.2f} % at the 95th percentile", 100 * result.noise->median,
+                        100 * result.noise->percentile_95);
+  }
+  return text;
 }
 
 std::string describe_order(const ChosenOrder& chosen) {

@@ -78,8 +78,8 @@ const std::atomic<bool>* stop_on_signals();
 RenderHooks console_hooks(Console& console);
 /// The memory plan as one log line.
 std::string describe_plan(const MemoryPlan& plan);
-/// The samples that pixels got, as one log line.
-std::string describe_samples(const SampleReport& samples);
+/// The samples that pixels got, and the noise that is left, as one log line.
+std::string describe_samples(const RenderResult& result);
 /// The order that was chosen, and why, as one log line.
 std::string describe_order(const ChosenOrder& chosen);
 std::string describe_plan(const BuildMemoryPlan& plan);

@@ -28,13 +28,14 @@ double FixedPoint128::to_double() const {
   return static_cast<double>(high) + static_cast<double>(low) * 0x1p-64;
 }
 
-Film::Film(uint32_t width, uint32_t height)
+Film::Film(uint32_t width, uint32_t height, uint32_t halves)
     : width_(width),
       height_(height),
-      pixels_(static_cast<size_t>(width) * height),
+      halves_(halves),
+      pixels_(size_t{width} * height * halves),
       locks_(std::make_unique<SpinLock[]>(kLocks)) {}
 
-bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered) {
+bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered, uint32_t half) {
   FixedPoint128 fixed[3];
   bool inside = true;
   for (int c = 0; c < 3; ++c) {
@@ -42,7 +43,7 @@ bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered) {
     inside = inside && value == radiance[c];
     fixed[c] = FixedPoint128::from_float(value);
   }
-  Pixel& p = pixels_[pixel];
+  Pixel& p = pixels_[half == 0 ? pixel : second(pixel)];
   std::lock_guard guard(locks_[pixel % kLocks]);
   for (int c = 0; c < 3; ++c) p.rgb[c].add(fixed[c]);
   p.covered += covered ? 1 : 0;
@@ -50,23 +51,41 @@ bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered) {
   return inside;
 }
 
+Film::Mean Film::mean_of(const Pixel& pixel) {
+  const double scale = pixel.added > 0 ? 1.0 / pixel.added : 0.0;
+  Mean mean;
+  for (int c = 0; c < 3; ++c) mean.rgba[c] = pixel.rgb[c].to_double() * scale;
+  mean.rgba[3] = pixel.covered * scale;
+  return mean;
+}
+
+Film::Mean Film::mean_of(const Pixel& a, const Pixel& b) {
+  if (b.added == 0) return mean_of(a);
+  if (a.added == 0) return mean_of(b);
+  Mean mean = mean_of(a);
+  const Mean other = mean_of(b);
+  for (int c = 0; c < 4; ++c) mean.rgba[c] = 0.5 * (mean.rgba[c] + other.rgba[c]);
+  return mean;
+}
+
 uint32_t Film::mean(uint32_t pixel, float rgb[3]) const {
-  Pixel p;
+  Pixel a, b;
   {
     std::lock_guard guard(locks_[pixel % kLocks]);
-    p = pixels_[pixel];
+    a = pixels_[pixel];
+    if (halves_ == 2) b = pixels_[second(pixel)];
   }
-  const double scale = p.added > 0 ? 1.0 / p.added : 0.0;
-  for (int c = 0; c < 3; ++c) rgb[c] = static_cast<float>(p.rgb[c].to_double() * scale);
-  return p.added;
+  const Mean mean = mean_of(a, b);
+  for (int c = 0; c < 3; ++c) rgb[c] = static_cast<float>(mean.rgba[c]);
+  return a.added + b.added;
 }
 
 std::vector<float> Film::resolve() const {
-  std::vector<float> rgba(pixels_.size() * 4);
-  for (size_t i = 0; i < pixels_.size(); ++i) {
-    const double scale = pixels_[i].added > 0 ? 1.0 / pixels_[i].added : 0.0;
-    for (int c = 0; c < 3; ++c) rgba[i * 4 + c] = static_cast<float>(pixels_[i].rgb[c].to_double() * scale);
-    rgba[i * 4 + 3] = static_cast<float>(static_cast<double>(pixels_[i].covered) * scale);
+  const size_t pixels = size_t{width_} * height_;
+  std::vector<float> rgba(pixels * 4);
+  for (size_t i = 0; i < pixels; ++i) {
+    const Mean mean = halves_ == 2 ? mean_of(pixels_[i], pixels_[second(i)]) : mean_of(pixels_[i]);
+    for (size_t c = 0; c < 4; ++c) rgba[i * 4 + c] = static_cast<float>(mean.rgba[c]);
   }
   return rgba;
 }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <thread>
 
+#include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
 #include "engine/film.h"
 #include "engine/hybrid_paths.h"
@@ -80,7 +81,9 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   plan.top_tree_bytes = scene.top_tree_bytes;
   plan.table_bytes = scene.table_bytes;
   // The sums and the resolved floats; the sums are gone before files are written from copies of the floats.
-  plan.film_bytes = Film::bytes(picture.width, picture.height) + pixels * kFloatPixelBytes;
+  const bool adaptive = picture.noise.asked();
+  plan.film_bytes = Film::bytes(picture.width, picture.height, adaptive ? 2 : 1) + pixels * kFloatPixelBytes;
+  if (adaptive) plan.noise_bytes = AdaptiveSampling::bytes(picture.width, picture.height);
   if (!execution.preview.path.empty()) plan.preview_bytes = Preview::bytes(picture.width, picture.height);
   plan.aov_bytes = AovFilm::bytes(picture.aovs, picture.width, picture.height, scene.file);
   plan.read_buffer_bytes = threads * (pages.largest + 2 * kPageAlignment);  // direct reads need their own

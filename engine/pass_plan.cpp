@@ -1,7 +1,7 @@
 #include "engine/pass_plan.h"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 
 namespace shoal {
 namespace {
@@ -12,22 +12,31 @@ constexpr double kWorthwhile = 0.01;
 
 }  // namespace
 
-SampleSpan PassPlan::next(double seconds) {
+SampleSpan PassPlan::next(double seconds, uint64_t pixels) {
   const uint32_t done = span_.end;
-  if (done > 0) sample_seconds_ = (seconds - began_) / span_.count();
-  uint32_t count = most_ - done;
-  if (limit_ > 0) count = std::min(count, done == 0 ? 1 : fitting(limit_ - seconds));
+  if (done > 0) sample_seconds_ = (seconds - began_) / (static_cast<double>(span_.count()) * static_cast<double>(pixels_));
+  uint32_t count = (levels_ ? std::min(next_level(done), most_) : most_) - done;
+  if (limit_ > 0) count = std::min(count, done == 0 ? (levels_ ? 2 : 1) : fitting(limit_ - seconds, pixels));
+  if (levels_) count &= ~1u;  // both halves
   began_ = seconds;
+  pixels_ = pixels;
   span_ = {done, done + count};
   if (count > 0) ++passes_count_;
   return span_;
 }
 
-uint32_t PassPlan::fitting(double seconds_left) const {
-  const double done = span_.end;
-  const double fit = sample_seconds_ > 0 ? seconds_left / sample_seconds_ : kGrowth * done;
+uint32_t PassPlan::fitting(double seconds_left, uint64_t pixels) const {
+  const double done = span_.end, each = sample_seconds_ * static_cast<double>(pixels);
+  const double fit = each > 0 ? seconds_left / each : kGrowth * done;
   if (fit < std::max(1.0, kWorthwhile * done)) return 0;
   return static_cast<uint32_t>(std::min(kGrowth * done, std::max(1.0, kCareful * fit)));
+}
+
+uint32_t next_level(uint32_t samples) {
+  constexpr uint32_t kFirst = 16;
+  if (samples < kFirst) return kFirst;
+  const uint32_t power = std::bit_floor(samples);
+  return samples < power + power / 2 ? power + power / 2 : 2 * power;
 }
 
 void Forecast::mark(uint64_t samples_done, double seconds) {

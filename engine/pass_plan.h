@@ -7,6 +7,9 @@
 //   at most 3 times the samples there are: barriers cost little, few samples are told of by few
 //   at most 3/4 of those that fit, if that is more than one: the last pass was not exactly like the next
 //   none when not one fits, or less than 1 % of what is there: nobody would see it
+// Where samples are drawn by what was seen (engine/adaptive_sampling.h), passes follow a list of levels besides: 16
+// samples, 24, 32, 48, 64 and so on; so many have the pixels that are still drawn, which get fewer. Without a time limit
+// the first pass has 16.
 // So a render ends within 1 % of its time or one sample a pixel before the limit, if a pass takes as long as foretold.
 // Called by engine/render. Plain values: the time is passed in. One thread.
 #pragma once
@@ -21,25 +24,32 @@ namespace shoal {
 class PassPlan {
  public:
   /// `limit_seconds`: 0: none.
-  PassPlan(uint32_t most_samples, double limit_seconds) : most_(most_samples), limit_(limit_seconds) {}
+  /// `levels`: as adaptive sampling takes them, of which `most_samples` must be even.
+  PassPlan(uint32_t most_samples, double limit_seconds, bool levels = false)
+      : most_(most_samples), limit_(limit_seconds), levels_(levels) {}
 
   /// What every pixel gets next, so many seconds after the render began, when the pass before has ended. An empty span:
-  /// nothing, the render is over.
-  SampleSpan next(double seconds);
+  /// nothing, the render is over. `pixels`: that the next pass draws; only their ratio from pass to pass matters.
+  SampleSpan next(double seconds, uint64_t pixels = 1);
 
   uint32_t done() const { return span_.end; }
   uint32_t passes_count() const { return passes_count_; }
 
  private:
-  uint32_t fitting(double seconds_left) const;
+  uint32_t fitting(double seconds_left, uint64_t pixels) const;
 
   uint32_t most_;
   double limit_;
+  bool levels_;
+  uint64_t pixels_ = 1;  ///< of the last pass
   SampleSpan span_;
   uint32_t passes_count_ = 0;
   double began_ = 0;           ///< the pass, in seconds
-  double sample_seconds_ = 0;  ///< that a sample a pixel took in the last pass
+  double sample_seconds_ = 0;  ///< that a sample of one of `pixels` took in the last pass
 };
+
+/// The level after so many samples a pixel.
+uint32_t next_level(uint32_t samples);
 
 /// When a render will be over. Seconds since it began; samples of all pixels together.
 struct Forecast {

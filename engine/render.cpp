@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/order_runner.h"
@@ -53,20 +54,53 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
+/// Samples a pixel at most. With a target for noise both halves have as many.
+uint32_t most_samples(const PictureOptions& picture) {
+  return picture.noise.asked() ? std::max(picture.samples & ~1u, 2u) : picture.samples;
+}
+
 /// Runs the orders over pass after pass. `samples`: of the first, is what context.samples names; of the last in the end.
 void render_passes(RenderContext& context, PassPlan& passes, SampleOrder& samples, OrderRunner& orders) {
+  const PictureOptions& picture = context.picture;
   for (;;) {
     orders.run(context);
     if (context.ended) return;
     context.end_pass();
-    const SampleSpan span = passes.next(now_seconds() - context.start_seconds);
+    AdaptiveSampling* const adaptive = context.adaptive;
+    if (adaptive != nullptr) {
+      adaptive->end_pass(context.film, passes.done());
+      if (adaptive->blocks().empty()) return;
+      context.forecast.samples_total = context.samples_before + adaptive->expected_samples(most_samples(picture));
+    }
+    const double seconds = now_seconds() - context.start_seconds;
+    const SampleSpan span = passes.next(seconds, adaptive != nullptr ? adaptive->drawn_pixels() : 1);
     if (span.count() == 0) return;
-    samples = SampleOrder(context.picture.width, context.picture.height, span, context.picture.tile_sample);
+    if (adaptive != nullptr && !adaptive->whole_picture()) {
+      samples = SampleOrder(picture.width, picture.height, span, adaptive->blocks());
+    } else {
+      samples = SampleOrder(picture.width, picture.height, span, picture.tile_sample);
+    }
   }
 }
 
-/// What a complete render leaves. Ends the preview, whose memory goes before that of the floats is taken.
-RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::optional<Preview>& preview) {
+/// Of the pixels that are rendered.
+SampleReport report_samples(const RenderContext& context, uint64_t pixels, uint32_t passes_count) {
+  SampleReport report{UINT32_MAX, 0, 0, 0, passes_count};
+  uint64_t sum = 0;
+  for (size_t pixel = 0; pixel < size_t{context.film.width()} * context.film.height(); ++pixel) {
+    const uint32_t added = context.film.added(pixel);
+    if (added == 0) continue;
+    report.least = std::min(report.least, added), report.most = std::max(report.most, added);
+    sum += added;
+  }
+  report.mean = static_cast<double>(sum) / static_cast<double>(pixels);
+  report.drawn_mean = static_cast<double>(context.samples_before) / static_cast<double>(pixels);
+  return report;
+}
+
+/// What a complete render of so many pixels leaves. Ends the preview, whose memory goes before that of the floats is taken.
+RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, uint64_t pixels,
+                           std::optional<Preview>& preview) {
   const PictureOptions& picture = context.picture;
   RenderResult result;
   if (preview) {
@@ -83,7 +117,7 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, std::
   result.plan = plan;
   result.threads = context.threads;
   result.picture_share =
-      static_cast<double>(context.samples.pixel_count()) / (static_cast<double>(picture.width) * picture.height);
+      static_cast<double>(pixels) / (static_cast<double>(picture.width) * picture.height);
   result.peak_cache_bytes = context.cache.peak_resident_bytes();
   result.read_backend = context.cache.read_backend();
   return result;
@@ -150,11 +184,16 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens),
                       camera_keys(scene, seen_by, picture.shading.effects));
   const bool previewed = !execution.preview.path.empty();
-  PassPlan passes(picture.samples, execution.time_limit_seconds);
+  const bool asked_noise = picture.noise.asked();
+  PassPlan passes(most_samples(picture), execution.time_limit_seconds, asked_noise);
   SampleOrder samples(picture.width, picture.height, passes.next(now_seconds() - start), picture.tile_sample,
                       previewed ? coarse_levels(plan) : 0);
-  const Sampler sampler(picture.shading.sampler, picture.shading.seed, picture.width, picture.height, picture.samples);
-  Film film(picture.width, picture.height);
+  const Sampler sampler(picture.shading.sampler, picture.shading.seed, picture.width, picture.height, most_samples(picture),
+                        asked_noise ? SampleSets::kHalves : SampleSets::kOne);
+  const uint64_t pixels = samples.pixel_count();
+  Film film(picture.width, picture.height, asked_noise ? 2 : 1);
+  std::optional<AdaptiveSampling> adaptive;
+  if (asked_noise) adaptive.emplace(picture.width, picture.height, picture.noise, execution.threads);
   std::unique_ptr<AovFilm> aovs;
   if (!picture.aovs.empty()) {
     SHOAL_ASSIGN_OR_RETURN(aovs, AovFilm::create(picture.aovs, picture.width, picture.height, *scene.file));
@@ -173,7 +212,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;
   context.aovs = aovs.get();
-  context.forecast = {samples.pixel_count() * picture.samples, execution.time_limit_seconds};
+  if (adaptive) context.adaptive = &*adaptive;
+  context.forecast = {asked_noise ? 0 : pixels * picture.samples, execution.time_limit_seconds};
   context.forecast.mark(0, now_seconds() - start);
   render_passes(context, passes, samples, orders);
   orders.release();
@@ -181,9 +221,10 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, context.samples_before));
-  RenderResult result = finish_result(context, plan, preview);
+  RenderResult result = finish_result(context, plan, pixels, preview);
   result.order = orders.chosen();
-  result.samples = {passes.done(), passes.done(), static_cast<double>(passes.done()), passes.passes_count()};
+  result.samples = report_samples(context, pixels, passes.passes_count());
+  if (adaptive) result.noise = adaptive->finish(film, result.standard_errors);
   take_times(context, start_ticks, result);
   return result;
 }

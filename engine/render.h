@@ -15,6 +15,7 @@
 #include "engine/counters.h"
 #include "engine/lens.h"
 #include "engine/memory_plan.h"
+#include "engine/noise_target.h"
 #include "engine/phase_clock.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
@@ -28,7 +29,8 @@ namespace shoal {
 
 struct PictureOptions {
   uint32_t width = 512, height = 512;
-  uint32_t samples = 16;
+  uint32_t samples = 16;  ///< with a target for noise: at most
+  NoiseTarget noise;      ///< asked for: samples are drawn where it is not met (engine/adaptive_sampling.h)
   uint32_t camera = 0;  ///< index among the scene's cameras; a scene without one is framed
   LensOptions lens;     ///< what the picture asks of the camera beyond its record
   uint32_t tile_sample = 1;  ///< for measuring: one in so many 32 x 32 tiles is rendered, the others stay black
@@ -93,16 +95,19 @@ struct RenderHooks {
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
 };
 
-/// The samples that pixels got.
+/// The samples that make up the pixels.
 struct SampleReport {
   uint32_t least = 0, most = 0;  ///< of a pixel that is rendered
   double mean = 0;
+  double drawn_mean = 0;         ///< with those that only helped to decide where to draw more
   uint32_t passes_count = 0;     ///< between which all threads waited for the last one
 };
 
 struct RenderResult {
   std::vector<float> rgba;  ///< width * height * 4
   SampleReport samples;
+  std::optional<NoiseReached> noise;   ///< with a target for noise, when there were enough samples to tell
+  std::vector<float> standard_errors;  ///< then: width * height, of luminance
   std::vector<ExrChannel> layers;  ///< of the AOVs asked for
   RenderCounters counters;
   MemoryPlan plan;

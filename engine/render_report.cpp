@@ -75,6 +75,7 @@ Json plan_json(const MemoryPlan& plan) {
           {"film_bytes", plan.film_bytes},
           {"preview_bytes", plan.preview_bytes},
           {"aov_bytes", plan.aov_bytes},
+          {"noise_bytes", plan.noise_bytes},
           {"path_state_bytes", plan.path_state_bytes},
           {"ray_bytes", plan.ray_bytes},
           {"paths_bytes", plan.paths_bytes()},
@@ -139,6 +140,8 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
           {"time_limit_seconds", execution.time_limit_seconds},
+          {"target_noise_median", picture.noise.median},
+          {"target_noise_percentile_95", picture.noise.percentile_95},
           {"camera", picture.camera},
           {"lens", lens_json(scene, picture)},
           {"tile_sample", picture.tile_sample},
@@ -241,6 +244,10 @@ ExrImage picture_image(const RenderResult& result, const Scene& scene, const Pic
   image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
   image.numbers["samplesPerPixel"] = static_cast<float>(result.samples.mean);
   add_accuracy(picture.shading, image);
+  if (result.noise) {
+    image.numbers["noiseMedian"] = result.noise->median;
+    image.numbers["noisePercentile95"] = result.noise->percentile_95;
+  }
   image.matrices["worldToCamera"] = to_camera;
   const Projection projection = projection_of(record, picture.lens);
   const bool flat = projection == Projection::kPerspective || projection == Projection::kOrthographic;
@@ -275,7 +282,14 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["samples"] = {{"mean", result.samples.mean},
                      {"least", result.samples.least},
                      {"most", result.samples.most},
+                     {"drawn_mean", result.samples.drawn_mean},
                      {"passes_count", result.samples.passes_count}};
+  if (picture.noise.asked()) {
+    const NoiseReached reached = result.noise.value_or(NoiseReached{});
+    json["noise"] = {{"median", result.noise ? Json(reached.median) : Json(nullptr)},
+                     {"percentile_95", result.noise ? Json(reached.percentile_95) : Json(nullptr)},
+                     {"target_met", result.noise && reached.meets(picture.noise)}};
+  }
   const auto first = [&](double FirstPicture::* member) {
     return result.first_picture ? Json((*result.first_picture).*member) : Json(nullptr);
   };

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/preview.h"
@@ -104,7 +105,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.pixel = sample.y * context_.picture.width + sample.x;
   path.sample = sample.sample;
   path.bounce = 0;
-  path.seeks = seeks_;
+  path.seeks = seeks_ && counts(path.pixel, path.sample);
   path.flags = kPathGoesOn;
   path.throughput = Vec3(1);
   path.bsdf_pdf = 0;
@@ -200,6 +201,10 @@ void RenderWorker::shade_miss(PathState& path) {
   shader_.shade_miss(path, shade_counters_);
 }
 
+bool RenderWorker::counts(uint32_t pixel, uint32_t sample) const {
+  return context_.adaptive == nullptr || context_.adaptive->counts(pixel, sample);
+}
+
 void RenderWorker::end_path(const PathState& path) {
   enter(Phase::kPaths);
   Vec3 radiance = path.radiance;
@@ -207,8 +212,16 @@ void RenderWorker::end_path(const PathState& path) {
     radiance = Vec3(0);
     invalid_.add(InvalidTerm::kPath, path);
   }
-  if (aovs_ != nullptr) end_features(path, radiance);
-  if (!context_.film.add(path.pixel, radiance, (path.flags & kPathCovered) != 0)) ++counters_.film_saturated_count;
+  const bool covered = (path.flags & kPathCovered) != 0;
+  uint32_t half = 0;
+  if (context_.adaptive != nullptr) {
+    context_.adaptive->add(path.pixel, path.sample, radiance, covered);
+    half = AdaptiveSampling::half_of(path.sample);
+  }
+  if (counts(path.pixel, path.sample)) {
+    if (aovs_ != nullptr) end_features(path, radiance);
+    if (!context_.film.add(path.pixel, radiance, covered, half)) ++counters_.film_saturated_count;
+  }
   ++counters_.samples_committed_count;
   counters_.path_state_moved_bytes += sizeof(PathState);
 }

@@ -18,6 +18,7 @@
 
 namespace shoal {
 
+class AdaptiveSampling;
 class AovFilm;
 class Preview;
 
@@ -41,6 +42,7 @@ struct RenderContext {
   unsigned threads;
   Preview* preview = nullptr;  ///< or none
   AovFilm* aovs = nullptr;     ///< or none
+  AdaptiveSampling* adaptive = nullptr;  ///< or none: every sample counts
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -116,6 +118,8 @@ class RenderWorker {
   uint32_t shade(uint32_t path_index, PathState& path, Ray rays[2]);
   /// The camera or bounce ray left the scene.
   void shade_miss(PathState& path);
+  /// Whether a sample is part of the picture, or only helps to decide where to draw more.
+  bool counts(uint32_t pixel, uint32_t sample) const;
   /// Adds the path to the film.
   void end_path(const PathState& path);
 

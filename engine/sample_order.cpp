@@ -25,6 +25,37 @@ SampleOrder::SampleOrder(uint32_t width, uint32_t height, SampleSpan span, uint3
   if (coarse_levels > 0) add_lattices(coarse_levels);
 }
 
+SampleOrder::SampleOrder(uint32_t width, uint32_t height, SampleSpan span, std::span<const uint32_t> blocks)
+    : width_(width),
+      height_(height),
+      first_sample_(span.begin),
+      samples_(span.count()),
+      tile_side_(kBlock),
+      pixel_count_(0) {
+  const uint32_t across = (width + kBlock - 1) / kBlock;
+  tiles_.reserve(blocks.size());
+  for (const uint32_t block : blocks) {
+    const uint32_t x = block % across, y = block / across;
+    tiles_.push_back({pixel_count_, pixels_before(x, y)});
+    pixel_count_ += pixels_in(x, y);
+  }
+}
+
+std::vector<uint32_t> SampleOrder::blocks_in_order(uint32_t width, uint32_t height) {
+  constexpr uint32_t kBlocks = kTile / kBlock;
+  const uint32_t across = (width + kBlock - 1) / kBlock, down = (height + kBlock - 1) / kBlock;
+  std::vector<uint32_t> blocks;
+  blocks.reserve(size_t{across} * down);
+  for (uint32_t tile_y = 0; tile_y < down; tile_y += kBlocks) {
+    for (uint32_t tile_x = 0; tile_x < across; tile_x += kBlocks) {
+      for (uint32_t y = tile_y; y < std::min(tile_y + kBlocks, down); ++y) {
+        for (uint32_t x = tile_x; x < std::min(tile_x + kBlocks, across); ++x) blocks.push_back(y * across + x);
+      }
+    }
+  }
+  return blocks;
+}
+
 void SampleOrder::leave_out_tiles(uint32_t tile_sample) {
   const uint32_t across = (width_ + kTile - 1) / kTile;
   const uint32_t tiles = across * ((height_ + kTile - 1) / kTile);
@@ -34,10 +65,9 @@ void SampleOrder::leave_out_tiles(uint32_t tile_sample) {
     // The last group may be smaller: it gives a tile as often as its size says, but a picture has at least one.
     const uint32_t choice = mix(group) % (group == 0 ? size : tile_sample);
     if (choice < size) {
-      const uint32_t x = (first + choice) % across * kTile, y = (first + choice) / across * kTile;
-      const uint64_t tile_height = std::min(kTile, height_ - y);
-      tiles_.push_back({pixel_count_, uint64_t{width_} * y + x * tile_height});
-      pixel_count_ += std::min(kTile, width_ - x) * tile_height;
+      const uint32_t x = (first + choice) % across, y = (first + choice) / across;
+      tiles_.push_back({pixel_count_, pixels_before(x, y)});
+      pixel_count_ += pixels_in(x, y);
     }
     first += size;
   }
@@ -84,13 +114,13 @@ PixelSample SampleOrder::coarse_first(uint64_t index) const {
 PixelSample SampleOrder::at_lattice(uint64_t index) const {
   const auto lattice = std::upper_bound(lattices_.begin(), lattices_.end(), index,
                                         [](uint64_t value, const Lattice& l) { return value < l.first; }) - 1;
-  const Place place = in_tiles(index - lattice->first, lattice->across, lattice->down);
+  const Place place = in_tiles(index - lattice->first, lattice->across, lattice->down, kTile);
   const uint32_t x = lattice->x + place.x * lattice->spacing, y = lattice->y + place.y * lattice->spacing;
   return tiles_.empty() ? PixelSample{x, y, first_sample_} : at_pixel(x, 0);
 }
 
 uint64_t SampleOrder::lattice_index(uint64_t pixel) const {
-  const Place p = tiles_.empty() ? in_tiles(pixel, width_, height_) : Place{static_cast<uint32_t>(pixel), 0};
+  const Place p = tiles_.empty() ? in_tiles(pixel, width_, height_, kTile) : Place{static_cast<uint32_t>(pixel), 0};
   if (((p.x | p.y) & (finest_spacing_ - 1)) != 0) return kNone;
   size_t number = 0;
   if (((p.x | p.y) & (lattices_[0].spacing - 1)) != 0) {

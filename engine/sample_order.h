@@ -7,6 +7,8 @@
 // that one, it names instead the sample displaced at that lattice index (repeated until free), so each sample occurs
 // once.
 //
+// Or of chosen blocks of 8 x 8 pixels only (engine/adaptive_sampling.h), in the order that is given.
+//
 // Of every pixel the samples [begin, end) of a span: what a render takes in one pass (engine/pass_plan.h).
 //
 // With `tile_sample` N only one in N tiles is rendered: of every N tiles in that order the one that a fixed hash names,
@@ -17,6 +19,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace shoal {
@@ -39,6 +42,13 @@ class SampleOrder {
   /// The samples [0, samples).
   SampleOrder(uint32_t width, uint32_t height, uint32_t samples, uint32_t tile_sample = 1, uint32_t coarse_levels = 0)
       : SampleOrder(width, height, SampleSpan{0, samples}, tile_sample, coarse_levels) {}
+  /// Of the pixels of `blocks` only, one block after the other. A block is named by its place, row by row.
+  SampleOrder(uint32_t width, uint32_t height, SampleSpan span, std::span<const uint32_t> blocks);
+  static constexpr uint32_t kBlock = 8;
+  /// All blocks, tile by tile.
+  static std::vector<uint32_t> blocks_in_order(uint32_t width, uint32_t height);
+  /// What an order of so many blocks holds.
+  static uint64_t bytes_of_blocks(uint64_t blocks) { return blocks * sizeof(Tile); }
   static constexpr uint32_t kAllLevels = 32;  ///< until every pixel has a sample
 
   uint64_t count() const { return pixel_count_ * samples_; }
@@ -82,18 +92,27 @@ class SampleOrder {
   uint64_t lattice_index(uint64_t pixel) const;
   static constexpr uint64_t kNone = ~0ull;
 
-  /// The `pixel`-th of a picture, tile by tile.
-  static Place in_tiles(uint64_t pixel, uint32_t width, uint32_t height) {
-    const uint64_t row_pixels = uint64_t{width} * kTile;  // of a full row of tiles
+  /// The `pixel`-th of a picture, tile by tile of so many pixels in x and y.
+  static Place in_tiles(uint64_t pixel, uint32_t width, uint32_t height, uint32_t side) {
+    const uint64_t row_pixels = uint64_t{width} * side;  // of a full row of tiles
     const uint32_t tile_y = static_cast<uint32_t>(pixel / row_pixels);
-    const uint32_t tile_height = std::min(kTile, height - tile_y * kTile);
+    const uint32_t tile_height = std::min(side, height - tile_y * side);
     uint64_t rest = pixel - tile_y * row_pixels;
-    const uint64_t tile_pixels = uint64_t{kTile} * tile_height;
+    const uint64_t tile_pixels = uint64_t{side} * tile_height;
     const uint32_t tile_x = static_cast<uint32_t>(rest / tile_pixels);
-    const uint32_t tile_width = std::min(kTile, width - tile_x * kTile);
+    const uint32_t tile_width = std::min(side, width - tile_x * side);
     rest -= tile_x * tile_pixels;
-    return {tile_x * kTile + static_cast<uint32_t>(rest % tile_width),
-            tile_y * kTile + static_cast<uint32_t>(rest / tile_width)};
+    return {tile_x * side + static_cast<uint32_t>(rest % tile_width),
+            tile_y * side + static_cast<uint32_t>(rest / tile_width)};
+  }
+  /// The pixels before tile (x, y), which starts inside the picture.
+  uint64_t pixels_before(uint32_t tile_x, uint32_t tile_y) const {
+    const uint32_t x = tile_x * tile_side_, y = tile_y * tile_side_;
+    return uint64_t{width_} * y + uint64_t{x} * std::min(tile_side_, height_ - y);
+  }
+  uint64_t pixels_in(uint32_t tile_x, uint32_t tile_y) const {
+    const uint32_t x = tile_x * tile_side_, y = tile_y * tile_side_;
+    return uint64_t{std::min(tile_side_, width_ - x)} * std::min(tile_side_, height_ - y);
   }
 
   /// `pixel` counts those that are rendered, `sample` those of the span.
@@ -103,15 +122,16 @@ class SampleOrder {
                                          [](uint64_t value, const Tile& t) { return value < t.first; }) - 1;
       pixel = tile->pixel + (pixel - tile->first);
     }
-    const Place place = in_tiles(pixel, width_, height_);
+    const Place place = in_tiles(pixel, width_, height_, tile_side_);
     return {place.x, place.y, first_sample_ + sample};
   }
 
   uint32_t width_, height_, first_sample_, samples_;
+  uint32_t tile_side_ = kTile;
   uint64_t pixel_count_;
   uint64_t first_lattice_count_ = 0, lattices_count_ = 0;  ///< samples
   uint32_t finest_spacing_ = 1;                            ///< of all lattices together
-  std::vector<Tile> tiles_;        ///< empty: all
+  std::vector<Tile> tiles_;        ///< empty: all. Of blocks in an order of such
   std::vector<Lattice> lattices_;  ///< empty: not coarse first. Of the picture, or of the row of pixels of all tiles_
 };
 

@@ -158,6 +158,37 @@ TEST(RenderScene, ATimeLimitSaysHowManySamplesItHadTimeFor) {
   expect_exit(run_shoal(folder, {"diff", folder / "limited.exr", folder / "asked.exr"}), 0);
 }
 
+TEST(RenderScene, ATargetForNoiseSaysWhatItTookAndWhetherItWasMet) {
+  const TemporaryFolder folder;
+  make_terrain(folder, "2K");
+  const std::vector<std::string> options = {"render", folder / "terrain.shoal", "--width", "24", "--height", "16", "-o",
+                                            folder / "out.exr", "--stats", folder / "out.json", "--max-memory",
+                                            fmt::format("{}M", kCapMiB)};
+  const ProgramRun met = run_shoal(folder, join(options, {"--target-noise", "20%:50%"}));
+  expect_exit(met, 0);
+  EXPECT_THAT(met.err, HasSubstr(", noise "));
+  EXPECT_THAT(met.err, HasSubstr(" % at the 95th percentile"));
+  EXPECT_THAT(met.err, ::testing::Not(HasSubstr("was not reached")));
+  json stats = parsed(file_text(folder / "out.json"));
+  EXPECT_EQ(stats["options"]["samples_per_pixel"], 4096);
+  EXPECT_FLOAT_EQ(stats["options"]["target_noise_percentile_95"].get<float>(), 0.5f);
+  EXPECT_EQ(stats["noise"]["target_met"], true);
+  EXPECT_LE(stats["noise"]["median"], 0.2);
+  EXPECT_GE(stats["samples"]["least"], 16);
+  EXPECT_GE(stats["samples"]["drawn_mean"], stats["samples"]["mean"]);
+  EXPECT_GT(stats["memory"]["noise_bytes"], 24 * 16 * 98);
+  const ExrImage picture = read_picture(folder / "out.exr");
+  EXPECT_FLOAT_EQ(picture.numbers.at("noiseMedian"), stats["noise"]["median"].get<float>());
+  EXPECT_FLOAT_EQ(picture.numbers.at("samplesPerPixel"), stats["samples"]["mean"].get<float>());
+  const ProgramRun missed = run_shoal(folder, join(options, {"--target-noise", "0.1%", "--spp", "21"}));
+  expect_exit(missed, 0);
+  EXPECT_THAT(missed.err, HasSubstr("warning: the noise asked for (0.1 % at the median, 0.2 % at the 95th percentile) was "
+                                    "not reached"));
+  stats = parsed(file_text(folder / "out.json"));
+  EXPECT_EQ(stats["noise"]["target_met"], false);
+  EXPECT_EQ(stats["samples"]["most"], 20) << "pairs";
+}
+
 TEST(RenderScene, LayersAreWrittenIntoThePictureAndCompared) {
   const TemporaryFolder folder;
   make_terrain(folder);

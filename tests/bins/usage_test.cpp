@@ -26,7 +26,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--environment-rotation",    "--environment-intensity",
                   "--policy",  "--page-cache", "--rays-in-flight", "--cache-dir", "--png", "--preview",
-                  "--tonemap", "--aov", "--time-limit", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted",
+                  "--tonemap", "--aov", "--time-limit", "--target-noise", "--exposure",   "--stats",          "--order",     "auto, queued, depth-first, sorted",
                   "--projection", "perspective, orthographic, equirectangular, fisheye", "--fov", "--ortho-height",
                   "--aperture", "--focus", "--distortion", "--time", "--animation",
                   "--triangle-test", "fast, watertight, double"}},
@@ -117,6 +117,7 @@ TEST(Usage, ValuesThatMakeNoSenseExitTwoBeforeAnythingIsRead) {
   expect({"--treelet-size", "8M"}, {"treelet size of 8388608 bytes", "4K to 4M"});
   expect({"--tonemap", "sepia"}, {"pbr-neutral", "sepia"});
   expect({"--exposure", "nan"}, {"exposure"});
+  for (const char* noise : {"0", "2%:1%", "little"}) expect({"--target-noise", noise}, {noise, "median", "2%:5%"});
   for (const char* limit : {"0", "-3", "nan", "inf"}) expect({"--time-limit", limit}, {"--time-limit", "more than 0"});
   expect({"--aov", "albedo,shine"}, {"unknown AOV 'shine'", "albedo, normal, depth", "all"});
   expect_error(run_shoal(folder, {"build", "x.gltf", "-o", folder / "y.shoal", "--treelet-size", "4095"}), 2,
