@@ -236,9 +236,11 @@ void AdaptiveSampling::judge(Half& half, uint32_t block) const {
 }
 
 void AdaptiveSampling::judge_all(Half& half) {
-  if (half.dark == 0) half.dark = dark_luminance([&](size_t pixel) {
-    return static_cast<float>(half.sums[pixel].sum.to_double() / samples_);
-  });
+  if (half.dark < 0) {  // once, while all blocks are drawn for this half alone
+    half.dark = dark_luminance([&](size_t pixel) {
+      return static_cast<float>(half.sums[pixel].sum.to_double() / samples_);
+    });
+  }
   each_drawn([&](uint32_t block) {
     if (half.judging[block] != 0) judge(half, block);
   });

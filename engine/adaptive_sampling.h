@@ -81,7 +81,7 @@ class AdaptiveSampling {
     std::vector<float> more;            ///< by block: how many times its samples it takes, as judged last
     std::vector<uint8_t> judging;       ///< by block: it would go on
     float more_of_all = 0;              ///< likewise, until the whole picture meets the target
-    float dark = 0;                     ///< luminance to which the noise of darker pixels is relative
+    float dark = -1;                    ///< luminance to which the noise of darker pixels is relative; from the first pass
   };
   struct Block {
     uint32_t x0, y0, x1, y1;
