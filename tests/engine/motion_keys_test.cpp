@@ -207,9 +207,9 @@ TEST(MotionKeys, EmittersThatMoveAreSampledWhereTheyAreAtThatTime) {
   const Material& material = built.scene.materials[built.scene.emitters[0].material];
   const LightReceiver receiver{{2, 0.5f, 3}, 0};
   const Environment none;
-  for (const uint64_t few : {0, 100}) {  // with a tree and without
-    const LightSampler lights(built.scene, none, 1, few);
-    EXPECT_EQ(lights.has_tree(), few == 0);
+  for (const LightChoice choice : {LightChoice::kTree, LightChoice::kPower, LightChoice::kUniform}) {
+    const LightSampler lights(built.scene, none, 1, choice);
+    EXPECT_EQ(lights.has_tree(), choice == LightChoice::kTree);
     for (const float time : {0.0f, 0.3f, 0.5f, 1.0f}) {
       const double size = 1.5 + time;
       double chance = 0;
@@ -219,7 +219,7 @@ TEST(MotionKeys, EmittersThatMoveAreSampledWhereTheyAreAtThatTime) {
         EXPECT_GT(pdf, 0);
         chance += pdf * (moves ? 0.5 * size * size : 0.5);
       }
-      EXPECT_NEAR(chance, 1, 1e-5) << few << " " << time;
+      EXPECT_NEAR(chance, 1, 1e-5) << static_cast<int>(choice) << " " << time;
       size_t moved = 0;
       double farthest = 0;
       for (int i = 0; i < 1000; ++i) {
