@@ -162,7 +162,7 @@ TEST_F(Accuracy, UnknownKnobsAreUsage) {
   const Result<AccuracyResult> result = measured();
   ASSERT_FALSE(result.ok());
   EXPECT_EQ(result.error().code, ErrorCode::kUsage);
-  EXPECT_NE(result.error().message.find("'shininess': expected one of samples, bounces"), std::string::npos)
+  EXPECT_NE(result.error().message.find("'shininess': expected one of samples, sampler, bounces"), std::string::npos)
       << result.error().message;
 }
 

@@ -264,6 +264,7 @@ TEST_F(AdaptiveRender, TheMeanOfManySeedsIsThatOfManySamples) {
   }
   EXPECT_GE(decided, kSeeds * 3 / 4) << "pictures of equal samples prove nothing";
   picture.shading.seed = 1000000;
+  picture.shading.sampler = SamplerKind::kIndependent;  // whose error is what the variance of its samples says
   picture.aovs = parse_aovs("variance").value();
   const RenderResult reference = plain(kReference);
   double reference_mean = 0, reference_variance = 0, deviations = 0;

@@ -200,10 +200,11 @@ TEST(MotionKeys, BetweenKeysAnEighthOfATurnApartItJumps) {
 
 TEST(MotionKeys, EmittersThatMoveAreSampledWhereTheyAreAtThatTime) {
   MovingScene moving("scale", 3, {0, 4}, {1, 1, 1, 3, 3, 3});
+  moving.scene.add_node({{"mesh", moving.scene.add_triangle_mesh(9, 1)}});
   moving.scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}}};
   for (auto& mesh : moving.scene.json["meshes"]) mesh["primitives"][0]["material"] = 0;
   const BuiltScene built = moving.build(1, 0, 2);  // it grows from 1.5 to 2.5
-  ASSERT_EQ(built.scene.emitters.size(), 2u);
+  ASSERT_GT(built.scene.emitters.size(), LightSampler::kFewLights);
   const Material& material = built.scene.materials[built.scene.emitters[0].material];
   const LightReceiver receiver{{2, 0.5f, 3}, 0};
   const Environment none;
