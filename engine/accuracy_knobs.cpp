@@ -111,6 +111,33 @@ AccuracyKnob sampler_knob() {
           false, false, values_at([](auto& s) -> auto& { return s.picture.shading.sampler; }, std::move(kinds))};
 }
 
+/// Limits of `place`, the lowest first, and none at last.
+template <class Place>
+std::vector<KnobValue> limits_at(Place place, std::set<float> limits) {
+  limits.erase(0);
+  std::vector<std::pair<std::string, float>> named;
+  for (const float limit : limits) named.emplace_back(fmt::format("{}", limit), limit);
+  named.emplace_back("off", 0.0f);
+  return values_at(place, std::move(named));
+}
+
+AccuracyKnob clamp_direct_knob(const AccuracySettings& base) {
+  return {"clamp-direct", "--clamp-direct",
+          "The most that light scattered once may add to a sample. A limit takes the brightest specks away, and the light "
+          "that they stand for.",
+          true, false,
+          limits_at([](auto& s) -> auto& { return s.picture.shading.clamp_direct; },
+                    {10, base.picture.shading.clamp_direct})};
+}
+
+AccuracyKnob clamp_indirect_knob(const AccuracySettings& base) {
+  return {"clamp-indirect", "--clamp-indirect",
+          "The same of light scattered more than once: less noise from rare bright ways, and darker where they matter.", true,
+          false,
+          limits_at([](auto& s) -> auto& { return s.picture.shading.clamp_indirect; },
+                    {1, 10, base.picture.shading.clamp_indirect})};
+}
+
 }  // namespace
 
 size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
@@ -122,7 +149,8 @@ size_t AccuracyKnob::value_of(const AccuracySettings& settings) const {
 
 std::vector<AccuracyKnob> accuracy_knobs(const AccuracySettings& base) {
   return {samples_knob(base),     sampler_knob(),      bounces_knob(base),   roulette_knob(base),
-          texture_filter_knob(), light_choice_knob(), triangle_test_knob(), positions_knob()};
+          texture_filter_knob(), light_choice_knob(), clamp_direct_knob(base), clamp_indirect_knob(base),
+          triangle_test_knob(), positions_knob()};
 }
 
 Result<std::vector<AccuracyKnob>> choose_knobs(std::vector<AccuracyKnob> knobs, const std::vector<std::string>& names) {

@@ -57,6 +57,23 @@ TEST_F(Accuracy, FindsTheBiasOfFewBouncesAndNoneOfRoulette) {
   EXPECT_GT(result.find("roulette", "1")->error.variance.value, result.find("roulette", "off")->error.variance.value);
 }
 
+TEST_F(Accuracy, FindsTheBiasOfALimitToLightAndNoneOfSamplers) {
+  job_.base.picture.shading.bounces = 32;
+  job_.base.picture.shading.environment.radiance = Vec3(4);
+  job_.knobs = {"clamp-indirect", "sampler"};
+  const AccuracyResult result = measure();
+  const AccuracyRow *low = result.find("clamp-indirect", "1"), *high = result.find("clamp-indirect", "10");
+  ASSERT_TRUE(low != nullptr && high != nullptr);
+  EXPECT_TRUE(low->error.biased);
+  EXPECT_GT(low->bias(), 0.05);
+  EXPECT_FALSE(high->error.biased) << "no light here is brighter than the sky";
+  for (const char* kind : {"independent", "blue-noise"}) {
+    const AccuracyRow* sampler = result.find("sampler", kind);
+    ASSERT_NE(sampler, nullptr) << kind;
+    EXPECT_FALSE(sampler->error.biased) << kind;
+  }
+}
+
 TEST_F(Accuracy, VarianceFallsWithTheNumberOfIndependentSamples) {
   job_.base.picture.shading.bounces = 32;
   job_.base.picture.shading.sampler = SamplerKind::kIndependent;
