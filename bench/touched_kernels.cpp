@@ -333,7 +333,8 @@ class TouchingTracer {
     for (uint32_t mask = lane.candidates; mask != 0; mask &= mask - 1) {
       const uint32_t i = static_cast<uint32_t>(std::countr_zero(mask));
       const Hit before = lane.job->ray->hit;
-      const bool done = test_triangle(treelet, leaf, leaf_offset(lane.ref), i, *lane.space, *lane.job, counters_);
+      const bool done = test_triangle<TriangleTest::kWatertight>(treelet, leaf, leaf_offset(lane.ref), i, *lane.space,
+                                                                *lane.job, counters_);
       const Hit& after = lane.job->ray->hit;
       if (after.instance != before.instance || after.primitive != before.primitive) {
         for (uint32_t byte = 0; byte < leaf.header().primitive_bytes; ++byte) {
