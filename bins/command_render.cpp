@@ -41,6 +41,11 @@ Status check_arguments(const Arguments& arguments) {
   if (arguments.has_time_limit && !(arguments.time_limit > 0 && std::isfinite(arguments.time_limit))) {
     return Error{ErrorCode::kUsage, fmt::format("--time-limit {}: expected seconds, more than 0", arguments.time_limit)};
   }
+  if (arguments.has_time_limit && arguments.render.picture.shading.sampler == SamplerKind::kBlueNoise) {
+    return Error{ErrorCode::kUsage,
+                 "--time-limit with --sampler blue-noise: its points depend on the number of samples, which is not known "
+                 "beforehand; take sobol"};
+  }
   for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
   }

@@ -119,6 +119,7 @@ TEST(Usage, ValuesThatMakeNoSenseExitTwoBeforeAnythingIsRead) {
   expect({"--exposure", "nan"}, {"exposure"});
   for (const char* noise : {"0", "2%:1%", "little"}) expect({"--target-noise", noise}, {noise, "median", "2%:5%"});
   for (const char* limit : {"0", "-3", "nan", "inf"}) expect({"--time-limit", limit}, {"--time-limit", "more than 0"});
+  expect({"--time-limit", "3", "--sampler", "blue-noise"}, {"--time-limit", "blue-noise"});
   expect({"--aov", "albedo,shine"}, {"unknown AOV 'shine'", "albedo, normal, depth", "all"});
   expect_error(run_shoal(folder, {"build", "x.gltf", "-o", folder / "y.shoal", "--treelet-size", "4095"}), 2,
                {"4095 bytes", "4K to 4M"});
