@@ -1,4 +1,4 @@
-// The options that trade accuracy for time (docs/sampling.md), of `render` and `compare`. Called by bins.
+// The options that trade accuracy for time (docs/sampling.md), of `render`, `compare`, `accuracy` and `batch`. Called by bins.
 #pragma once
 
 #include <CLI/CLI.hpp>

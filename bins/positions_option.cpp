@@ -12,8 +12,8 @@ void declare_positions(CLI::App& app, std::optional<PositionPrecision>& position
            if (!precision.ok()) throw CLI::ValidationError("--positions", precision.error().message);
            positions = precision.value();
          },
-         "exact, 21, 16: bits of a position along the scene's longest side when a glTF is built; fewer are smaller and "
-         "faster (default exact; `shoal info` prints by how much points moved)")
+         "exact, 21, 16: bits of a position along its object's longest side when a glTF is built; fewer take less memory "
+         "and fewer reads (default exact; `shoal info` prints by how much points moved)")
       ->type_name("BITS");
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bins/report_assets.h"
+#include "engine/batch_text.h"
 #include "io/base64.h"
 #include "io/png_image.h"
 
@@ -14,20 +15,6 @@ namespace {
 constexpr const char* kNoPlots =
     "This plot needs the library uPlot, which was not at hand when the program was built (npm and a network, then configure "
     "again). Its numbers are in the table.";
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
 
 /// JSON may hold "</script>" and "<!--" in strings, which would end the element early.
 std::string in_script(const std::string& json) {
@@ -51,29 +38,29 @@ struct Writer {
   std::string html;
   Status status = {};
 
-  void operator()(const ReportHeading& block) { html += fmt::format("<h3>{}</h3>\n", escaped(block.text)); }
-  void operator()(const ReportText& block) { html += fmt::format("<p>{}</p>\n", escaped(block.text)); }
+  void operator()(const ReportHeading& block) { html += fmt::format("<h3>{}</h3>\n", html_escape(block.text)); }
+  void operator()(const ReportText& block) { html += fmt::format("<p>{}</p>\n", html_escape(block.text)); }
 
   void operator()(const ReportList& block) {
     html += "<ul>\n";
-    for (const std::string& item : block.items) html += fmt::format("<li>{}</li>\n", escaped(item));
+    for (const std::string& item : block.items) html += fmt::format("<li>{}</li>\n", html_escape(item));
     html += "</ul>\n";
   }
 
   void operator()(const ReportTable& block) {
     html += "<div class=\"scroll\"><table>\n<thead><tr>";
-    for (const std::string& head : block.head) html += fmt::format("<th>{}</th>", escaped(head));
+    for (const std::string& head : block.head) html += fmt::format("<th>{}</th>", html_escape(head));
     html += "</tr></thead>\n<tbody>\n";
     for (const ReportTable::Row& row : block.rows) {
       html += row.marked ? "<tr class=\"marked\">" : "<tr>";
       for (const ReportCell& cell : row.cells) {
-        html += cell.value ? fmt::format("<td data-value=\"{}\">{}</td>", *cell.value, escaped(cell.text))
-                           : fmt::format("<td>{}</td>", escaped(cell.text));
+        html += cell.value ? fmt::format("<td data-value=\"{}\">{}</td>", *cell.value, html_escape(cell.text))
+                           : fmt::format("<td>{}</td>", html_escape(cell.text));
       }
       html += "</tr>\n";
     }
     html += "</tbody></table></div>\n";
-    if (!block.caption.empty()) html += fmt::format("<p class=\"note\">{}</p>\n", escaped(block.caption));
+    if (!block.caption.empty()) html += fmt::format("<p class=\"note\">{}</p>\n", html_escape(block.caption));
   }
 
   void operator()(const ReportPlot& plot) {
@@ -91,7 +78,7 @@ struct Writer {
       if (!one["x"].empty()) spec["series"].push_back(one);
     }
     html += fmt::format("<figure class=\"plot\" data-points=\"{}\"><h3>{}</h3>\n<div class=\"place\">{}</div>\n", points,
-                        escaped(plot.title),
+                        html_escape(plot.title),
                         report_has_plots() ? "" : fmt::format("<p class=\"missing\">{}</p>", kNoPlots));
     html += fmt::format("<script type=\"application/json\">{}</script></figure>\n", in_script(dump(spec)));
   }
@@ -107,9 +94,9 @@ struct Writer {
           continue;
         }
         html += fmt::format("<img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">", block.width,
-                            block.height, escaped(item.caption), encode_base64(png.value()));
+                            block.height, html_escape(item.caption), encode_base64(png.value()));
       }
-      html += fmt::format("</div><figcaption>{}</figcaption></figure>\n", escaped(item.caption));
+      html += fmt::format("</div><figcaption>{}</figcaption></figure>\n", html_escape(item.caption));
     }
     html += "</div>\n";
   }
@@ -131,11 +118,11 @@ Result<std::string> report_html(const ReportPage& page) {
   Writer writer;
   std::string& html = writer.html;
   html += kHead;
-  html += fmt::format("<title>{}</title>\n<style>{}\n{}</style>\n</head>\n<body>\n", escaped(page.title), kPlotStyle,
+  html += fmt::format("<title>{}</title>\n<style>{}\n{}</style>\n</head>\n<body>\n", html_escape(page.title), kPlotStyle,
                       kReportTheme);
-  html += fmt::format("<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n", escaped(page.title), escaped(page.subtitle));
+  html += fmt::format("<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n", html_escape(page.title), html_escape(page.subtitle));
   for (const ReportSection& section : page.sections) {
-    html += fmt::format("<section>\n<h2>{}</h2>\n", escaped(section.heading));
+    html += fmt::format("<section>\n<h2>{}</h2>\n", html_escape(section.heading));
     for (const auto& block : section.blocks) std::visit(writer, block);
     html += "</section>\n";
   }

@@ -97,7 +97,7 @@ AccuracyKnob positions_knob() {
     named.emplace_back(position_precision_name(p), p);
   }
   return {"positions", "--positions",
-          "Bits of a vertex's position along the scene's longest side. Fewer make a smaller file of fewer treelets, and "
+          "Bits of a vertex's position along its object's longest side. Fewer make a smaller file of fewer treelets, and "
           "move surfaces by a known distance at most.",
           true, true, values_at([](auto& s) -> auto& { return s.build.positions; }, std::move(named))};
 }

@@ -1,5 +1,5 @@
 // What `--target-noise` asks for and what was reached: relative standard errors of pixels, as engine/adaptive_sampling.h
-// estimates them. Plain values.
+// estimates them. Called by bins/command_render, engine/render and engine/adaptive_sampling. Plain values.
 #pragma once
 
 #include <string>

@@ -180,6 +180,7 @@ void add_accuracy(const ShadingOptions& shading, ExrImage& image) {
   image.text["sampler"] = sampler_name(shading.sampler);
   image.text["lightChoice"] = light_choice_name(shading.light_choice);
   image.text["textureFilter"] = texture_filter_name(shading.texture_filter);
+  image.text["triangleTest"] = triangle_test_name(shading.triangle_test);
   image.numbers["bounces"] = static_cast<float>(shading.bounces);
   const bool roulette = shading.roulette_start != ShadingOptions::kNoRoulette;
   image.text["rouletteStart"] = roulette ? fmt::format("{}", shading.roulette_start) : "off";
