@@ -10,6 +10,7 @@
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
+#include "engine/accuracy_names.h"
 #include "engine/accuracy_report.h"
 #include "engine/render_report.h"
 
@@ -97,6 +98,9 @@ Status read_reference(const std::string& path, AccuracyJob& job) {
       return Error{ErrorCode::kInput, path + ": expected finite values, found one that is not"};
     }
   }
+  // The samples' variance says how far their mean may be off only where they are independent.
+  const auto sampler = image.text.find("sampler");
+  if (sampler == image.text.end() || sampler->second != sampler_name(SamplerKind::kIndependent)) return {};
   job.reference_variance = join_channels(image, "variance.");
   const ExrChannel* samples = channel_of(image, "samples.Y");
   for (size_t i = 0; i < job.reference_variance.size(); ++i) {
@@ -131,6 +135,7 @@ class Hooks {
       console_.show_progress(stage, fraction, seconds, "");
     };
     hooks.open = [this](const std::function<void(SceneBuildOptions&)>& change) { return open(change); };
+    hooks.close = [this] { other_.reset(); };
   }
 
   AccuracyHooks hooks;

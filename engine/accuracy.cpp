@@ -163,7 +163,10 @@ class Measurement {
     for (const AccuracyKnob& knob : accuracy_knobs(base_)) {
       if (knob.rebuilds) asked.push_back(knob.value_of(settings)), own.push_back(knob.value_of(base_));
     }
-    if (asked == own || !job_.may_rebuild || !hooks_.open) return base_scene_;
+    if (asked == own || !job_.may_rebuild || !hooks_.open) {
+      if (hooks_.close) hooks_.close();
+      return base_scene_;
+    }
     return hooks_.open([&settings, knobs = accuracy_knobs(base_)](SceneBuildOptions& options) {
       AccuracySettings changed = settings;
       changed.build = options;
@@ -224,7 +227,7 @@ class Measurement {
   Status measure_with_samples(const std::string& name, AccuracySettings settings) {
     const uint32_t own = base_.picture.samples;
     for (const uint32_t samples : {own / 4, own, own * 4}) {
-      if (samples == 0) continue;
+      if (samples == 0 || samples > (1u << 22)) continue;
       settings.picture.samples = samples;
       SHOAL_RETURN_IF_ERROR(measure_within_budget({"together", fmt::format("{}, {} spp", name, samples), settings}));
     }

@@ -47,6 +47,7 @@ struct AccuracyScene {
 struct AccuracyHooks {
   /// Opens the scene built with what `change` makes of the job's build options; only one is open beside the base.
   std::function<Result<AccuracyScene>(const std::function<void(SceneBuildOptions&)>& change)> open;
+  std::function<void()> close;  ///< may be empty; lets go of what was opened: only the base is used until the next open()
   std::function<void(const std::string& stage, double fraction, double seconds)> progress;  ///< may be empty
   std::function<void(const std::string&)> note;                                              ///< may be empty
   const std::atomic<bool>* stop = nullptr;

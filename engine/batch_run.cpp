@@ -198,13 +198,13 @@ class BatchRun {
   /// Looks whether the scene is done, and starts its render if it is not.
   Status begin(size_t index, const BatchShare& share) {
     BatchEntry& entry = standing_.entries[index];
-    if (entry.scene.error) return failed(entry, *entry.scene.error);
+    if (entry.scene.error) return set_aside(entry, *entry.scene.error);
     auto look = look_at_scene(fs_, options_, rules_, entry.scene, hooks_.stop);
     if (!look.ok() && look.error().code == ErrorCode::kStopped) {
       --next_;
       return {};
     }
-    if (!look.ok()) return failed(entry, look.error());
+    if (!look.ok()) return set_aside(entry, look.error());
     entry.record = std::move(look.value().record);
     entry.skipped = look.value().done && !options_.force;
     if (look.value().done && options_.force) entry.record = forgotten(std::move(entry.record));
@@ -252,7 +252,8 @@ class BatchRun {
       remove_all_temporaries(paths_.built(entry.scene));
     }
     if (!options_.keep_built) remove_folder(paths_.built(entry.scene));
-    const bool stopped_by_us = told_ && (end.exit_code == kStoppedExit || end.signal == SIGTERM || end.signal == SIGINT);
+    const bool stopped_by_us =
+        (told_ || stopped()) && (end.exit_code == kStoppedExit || end.signal == SIGTERM || end.signal == SIGINT);
     if (stopped_by_us) {
       record.message.clear();
       return {};  // its record says "started": it is rendered by the next batch
@@ -295,11 +296,21 @@ class BatchRun {
     return ended(entry);
   }
 
-  Status failed(BatchEntry& entry, const Error& error) {
+  static void note_failure(BatchEntry& entry, const Error& error) {
     entry.record.exit_code = static_cast<int>(error.code);
     entry.record.message = error.message;
     entry.record.state = SceneState::kFailed;
+  }
+
+  Status failed(BatchEntry& entry, const Error& error) {
+    note_failure(entry, error);
     return ended(entry);
+  }
+
+  /// A scene that cannot be looked at. What stands on disk of it, pictures and record, stays: it may be as it was next time.
+  Status set_aside(BatchEntry& entry, const Error& error) {
+    note_failure(entry, error);
+    return announce(entry);
   }
 
   Status ended(BatchEntry& entry) {
@@ -308,6 +319,11 @@ class BatchRun {
           std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
       SHOAL_RETURN_IF_ERROR(write_record(fs_, paths_.record(entry.scene), entry.record));
     }
+    entry.record.content = {};  // of very many scenes too much to keep
+    return announce(entry);
+  }
+
+  Status announce(BatchEntry& entry) {
     if (hooks_.ended) hooks_.ended(entry, standing_.counts());
     // After each scene, but not for a tenth of the time or more: those of very many scenes are large.
     if (seconds_since(summary_ended_) < 10 * summary_seconds_) return {};

@@ -17,6 +17,8 @@ constexpr double kTolerance = 1e-3;
 constexpr uint32_t kFewestKeys = 17;
 /// A matrix here and in its map, its row and its copies.
 constexpr uint64_t kRowBytes = 1024;
+/// More keys than the fewest are taken while all nodes together have so many.
+constexpr uint64_t kMaxMotionRows = 1u << 17;
 
 using Worlds = std::map<uint32_t, AffineDouble>;
 
@@ -82,15 +84,9 @@ class MotionFinder {
 
   Result<MotionKeys> find() {
     choose_nodes();
-    if (nodes_.size() * kFewestKeys > most_rows_) {
-      return Error{ErrorCode::kMemoryCap,
-                   fmt::format("{}: {} nodes move while the shutter is open: building needs a memory cap of {} MiB at "
-                               "least",
-                               document_.path, nodes_.size(), (8 * kRowBytes * kFewestKeys * nodes_.size() >> 20) + 1)};
-    }
     SHOAL_RETURN_IF_ERROR(refine(kFewestKeys));
     for (uint32_t keys = kFewestKeys; !all_straight(); keys = 2 * keys - 1) {
-      if (2 * keys - 1 > kMaxMotionKeys || nodes_.size() * (2 * keys - 1) > most_rows_) break;
+      if (2 * keys - 1 > kMaxMotionKeys || nodes_.size() * (2 * keys - 1) > kMaxMotionRows) break;
       SHOAL_RETURN_IF_ERROR(refine(2 * keys - 1));
     }
     collect();
@@ -98,6 +94,14 @@ class MotionFinder {
   }
 
  private:
+  /// A cap too small is refused: fewer keys would change the picture.
+  Status check_rows(uint64_t keys) const {
+    if (nodes_.size() * keys <= most_rows_) return {};
+    return Error{ErrorCode::kMemoryCap,
+                 fmt::format("{}: {} nodes move while the shutter is open: building needs a memory cap of {} MiB at least",
+                             document_.path, nodes_.size(), (8 * kRowBytes * keys * nodes_.size() >> 20) + 1)};
+  }
+
   void choose_nodes() {
     const std::set<uint32_t> moved = moved_nodes(document_, pose_.animation);
     for (const auto& [node, world] : worlds_of(document_, moved)) {
@@ -141,6 +145,7 @@ class MotionFinder {
 
   /// Samples so many keys, of which every other is known.
   Status refine(uint32_t keys) {
+    SHOAL_RETURN_IF_ERROR(check_rows(keys));
     std::vector<Worlds> all(keys);
     for (uint32_t k = 0; k < keys; ++k) {
       if (k % 2 == 0 && keys > kFewestKeys) {

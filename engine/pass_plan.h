@@ -31,6 +31,8 @@ class PassPlan {
   /// What every pixel gets next, so many seconds after the render began, when the pass before has ended. An empty span:
   /// nothing, the render is over. `pixels`: that the next pass draws; only their ratio from pass to pass matters.
   SampleSpan next(double seconds, uint64_t pixels = 1);
+  /// How many pixels the pass that next() named last draws, where next() was not told yet.
+  void begins_with(uint64_t pixels) { pixels_ = pixels; }
 
   uint32_t done() const { return span_.end; }
   uint32_t passes_count() const { return passes_count_; }

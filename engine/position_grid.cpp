@@ -52,7 +52,10 @@ PositionGrid PositionGrid::of(PositionPrecision precision, const Bounds3& bounds
   if (!(extent > 0)) return {};
   const int wanted = power_above(extent) - static_cast<int>(precision), finest = power_above(largest) - kMostBits;
   const int exponent = std::max(wanted, finest);
-  return exponent < -126 ? PositionGrid{} : PositionGrid{std::ldexp(1.0f, exponent), finest > wanted};
+  const double step = std::ldexp(1.0, exponent);
+  // What is too small for floats, or would be rounded to more than they hold, stays as it is.
+  if (exponent < -126 || std::nearbyint(largest / step) * step > std::numeric_limits<float>::max()) return {};
+  return {static_cast<float>(step), finest > wanted};
 }
 
 void PositionGrid::round(std::span<float> coordinates) const {

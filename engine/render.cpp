@@ -193,7 +193,10 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const uint64_t pixels = samples.pixel_count();
   Film film(picture.width, picture.height, asked_noise ? 2 : 1);
   std::optional<AdaptiveSampling> adaptive;
-  if (asked_noise) adaptive.emplace(picture.width, picture.height, picture.noise, execution.threads);
+  if (asked_noise) {
+    adaptive.emplace(picture.width, picture.height, picture.noise, execution.threads);
+    passes.begins_with(pixels);
+  }
   std::unique_ptr<AovFilm> aovs;
   if (!picture.aovs.empty()) {
     SHOAL_ASSIGN_OR_RETURN(aovs, AovFilm::create(picture.aovs, picture.width, picture.height, *scene.file));

@@ -89,7 +89,7 @@ struct RenderProgress {
 
 struct RenderHooks {
   std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
-  std::function<void(const ChosenOrder&)> chosen;       ///< may be empty; called once for Order::kAuto
+  std::function<void(const ChosenOrder&)> chosen;       ///< may be empty; for Order::kAuto, once more when trials chose another time
   std::function<void(const RenderProgress&)> progress;  ///< may be empty; now and then, one call at a time
   std::function<void(const std::string&)> warning;      ///< may be empty; what went wrong and does not end the render
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true

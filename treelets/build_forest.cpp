@@ -288,8 +288,8 @@ uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout) {
 
 uint64_t page_in_flight_bytes(uint32_t treelet_bytes, const CornerLayout& layout, bool on_grid) {
   // The page, its nodes and its leaves while vectors grow to twice their size; then the corners of its triangles, of
-  // which each takes 12 bytes of the page at least, or 9 on a grid, with the table that finds equal ones.
-  const uint64_t triangles = treelet_bytes / (on_grid ? 9 : 12);
+  // which each takes 8 bytes of the page at least, or 7 on a grid (leaves of copies), with the table that finds equal ones.
+  const uint64_t triangles = treelet_bytes / (on_grid ? 7 : 8);
   const uint64_t corner_bytes = layout.floats() == 0 ? 0 : 2 * 4ull * layout.floats() + 4 + 16;
   return 5ull * treelet_bytes + triangles * (8 + 3 * corner_bytes);
 }

@@ -116,6 +116,7 @@ Status TopTree::check(std::span<const TopNode> nodes, std::span<const TreeletEnt
   while (count < rows.size() && rows[count].tree_child != kNoIndex) ++count;
   const std::span<const Instance> instances = rows.first(count);
   for (uint32_t i = 0; i < rows.size(); ++i) SHOAL_RETURN_IF_ERROR(check_finite(rows[i], i));
+  if (count == 0 && !rows.empty()) return corrupt(fmt::format("{} keys without an instance", rows.size()));
   for (uint32_t i = static_cast<uint32_t>(count); i < rows.size(); ++i) {
     const bool key = rows[i].tree_child == kNoIndex && !rows[i].moves() && rows[i].key_count <= 1;
     if (!key) return corrupt(fmt::format("row {} of the instances, behind the first key, is no key", i));

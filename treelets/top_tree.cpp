@@ -310,7 +310,7 @@ TopTree::TopTree(std::vector<TopNode> nodes, std::vector<TreeletEntry> entries, 
   const auto is_key = [](const Instance& row) { return row.tree_child == kNoIndex; };
   const auto first_key = std::find_if(instances_.begin(), instances_.end(), is_key);
   instance_count_ = static_cast<uint32_t>(first_key - instances_.begin());
-  single_identity_ = instances_.size() == 1 && instances_[0].identity != 0;
+  single_identity_ = instance_count_ == 1 && instances_.size() == 1 && instances_[0].identity != 0;
 }
 
 void TopTree::next(std::span<NextJob> jobs) const {

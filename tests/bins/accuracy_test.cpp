@@ -104,7 +104,7 @@ TEST(Accuracy, AReferenceWithTheLayersVarianceAndSamplesHasKnownNoise) {
   for (const std::vector<std::string>& layers : {std::vector<std::string>{}, {"--aov", "variance,samples"}}) {
     expect_exit(run_shoal(folder, join({"render", folder / "scene.gltf", "-o", folder / "reference.exr", "--width", "24",
                                         "--height", "16", "--spp", "64", "--bounces", "32", "--seed", "99", "--environment",
-                                        "constant:1,1,1", "--quiet"},
+                                        "constant:1,1,1", "--sampler", "independent", "--quiet"},
                                        layers)),
                 0);
     expect_exit(run_shoal(folder, accuracy(folder, {"--knobs", "roulette", "--reference", folder / "reference.exr"})), 0);

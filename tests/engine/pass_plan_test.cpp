@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 namespace shoal {
@@ -50,6 +51,23 @@ TEST(PassPlan, FillsTheTimeThoughPassesAreSlowToStartAndTheFirstReadsTheScene) {
     });
     EXPECT_LE(end, 60.0) << start;
     EXPECT_GE(end, 60 - 0.6 - 0.01 - start) << start;
+  }
+}
+
+TEST(PassPlan, FillsTheTimeThoughFewerPixelsAreDrawnFromPassToPass) {
+  for (const double sample_seconds : {1e-6, 1e-5, 1e-4}) {  // of a pixel
+    PassPlan passes(1u << 22, 60, true);
+    uint64_t pixels = 262144;
+    double now = 0.5;
+    SampleSpan span = passes.next(now);
+    passes.begins_with(pixels);
+    for (; span.count() > 0; span = passes.next(now, pixels)) {
+      now += sample_seconds * span.count() * static_cast<double>(pixels);
+      pixels = std::max<uint64_t>(pixels * 3 / 4, 1024);
+      ASSERT_LT(passes.passes_count(), 100u);
+    }
+    EXPECT_LT(now, 60 * 1.01) << sample_seconds;
+    EXPECT_GT(now, 20) << sample_seconds << ": it ended early";
   }
 }
 

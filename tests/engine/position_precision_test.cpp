@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 
 #include "engine/position_grid.h"
@@ -30,6 +31,17 @@ SceneBuildOptions with(PositionPrecision precision, const Cut& cut = {}) {
 }
 
 constexpr PositionPrecision kRounded[] = {PositionPrecision::k21, PositionPrecision::k16};
+
+TEST(PositionGrid, NothingIsRoundedBeyondWhatFloatsHold) {
+  for (const PositionPrecision precision : {PositionPrecision::k16, PositionPrecision::k21}) {
+    Bounds3 bounds;
+    bounds.include(Vec3(0));
+    bounds.include(Vec3(std::numeric_limits<float>::max(), 1, 1));
+    float corners[] = {std::numeric_limits<float>::max(), 1, 1};
+    PositionGrid::of(precision, bounds).round(corners);
+    for (const float x : corners) EXPECT_TRUE(std::isfinite(x));
+  }
+}
 
 TEST(PositionGrid, NamesAndParsesEveryPrecision) {
   for (const PositionPrecision precision : kPositionPrecisions) {

@@ -159,5 +159,16 @@ TEST(MovingInstance, TablesThatNameNoKeysAreRefused) {
   EXPECT_TRUE(refused([](auto& rows) { rows[5].object_to_world.translation.x = NAN; }));
 }
 
+TEST(MovingInstance, ATableOfKeysAloneIsRefused) {
+  // Nothing shows the key, so nothing else would look at the tree that it names.
+  TopNode empty{};
+  empty.parent = kNoIndex;
+  for (auto& kind : empty.kind) kind = ChildKind::kEmpty;
+  Instance key{};
+  key.identity = 1, key.tree_child = kNoIndex, key.root_node = 0x1fffffff;
+  EXPECT_FALSE(TopTree::check(std::vector{empty}, {}, std::vector{key}, 0).ok());
+  EXPECT_TRUE(TopTree::check(std::vector{empty}, {}, {}, 0).ok());
+}
+
 }  // namespace
 }  // namespace shoal
