@@ -6,6 +6,10 @@
 // t_near(B) <= t_near(A) and t_far(A) <= t_far(B) in the computed values, and what enters A enters B. A hit counts
 // only if the triangle's own box is entered and its t is clamped to that box's span; hence every box above it is
 // entered too, and the shape of the BVH cannot change the picture.
+//
+// Along an axis whose inverse is held at the largest float (a component that is zero, or denormal) a ray whose t are as
+// large would leave the box too early. There the far result of an extreme ray is multiplied once more: beyond every t, or
+// below 0.
 #pragma once
 
 #include <bit>
@@ -31,10 +35,11 @@ inline BoxSpan cross_box(const RaySpace& ray, const float lo[3], const float hi[
     const float far_inverse = std::min(std::max(ray.inverse[axis] * kFarScale, -kMax), kMax);
     near[axis] = (near_plane - (ray.origin[axis] + toward)) * ray.inverse[axis];
     far[axis] = (far_plane - (ray.origin[axis] - toward)) * far_inverse;
+    if (ray.extreme && std::abs(ray.inverse[axis]) == kMax) far[axis] *= kMax;
   }
   BoxSpan span;
   span.t_near = std::max(0.0f, std::max(near[2], std::max(near[1], near[0])));
-  span.t_far = std::min(far[2], std::min(far[1], far[0]));
+  span.t_far = std::min(std::min(far[2], std::min(far[1], far[0])), kMax);
   return span;
 }
 

@@ -103,6 +103,7 @@ class PacketLeaves {
     space.direction[space.kz] = packet.direction[space.kz][lane];
     space.shear_x = packet.shear_x[lane], space.shear_y = packet.shear_y[lane];
     space.pad = packet.pad[lane];
+    space.extreme = false;  // such rays are in no packet
     return space;
   }
 

@@ -68,8 +68,12 @@ inline float max_abs(const float v[3]) { return std::max({std::abs(v[0]), std::a
 
 /// Slopes are held below kMaxSlope times the least.
 inline constexpr float kMaxSlope = 0x1p60f;
+/// Of rays that are not extreme. A ray is in a box that it touches until 2 R slope at most, and by an axis along which it does
+/// not move, whose inverse is held at 2^128, until 2 u R 2^128 at least (2 u R: what the pad has left), which is later then.
+inline constexpr float kMostLeastSlope = 0x1p100f;
 inline bool is_extreme(float largest_slope, float least_slope, float reach) {
-  return !(largest_slope * reach < 0x1p100f && least_slope > 1 / kMaxSlope && reach > 0x1p-60f);
+  return !(largest_slope * reach < 0x1p100f && least_slope > 1 / kMaxSlope && least_slope < kMostLeastSlope &&
+           reach > 0x1p-60f);
 }
 
 /// Sets the pads. `reach`: R above, max|origin| and the extent of what is traced.

@@ -124,8 +124,9 @@ class PacketRun : private PacketLeaves {
     hn::Store(hn::Div(direction[packet.k[0]], direction[packet.k[2]]), f, packet.shear_x);
     hn::Store(hn::Div(direction[packet.k[1]], direction[packet.k[2]]), f, packet.shear_y);
     hn::Store(pad, f, packet.pad);
+    const auto sloped = hn::And(hn::Gt(least, hn::Set(f, 1 / kMaxSlope)), hn::Lt(least, hn::Set(f, kMostLeastSlope)));
     const auto usual = hn::And(hn::Lt(hn::Mul(largest, reach), hn::Set(f, 0x1p100f)),
-                               hn::And(hn::Gt(least, hn::Set(f, 1 / kMaxSlope)), hn::Gt(reach, hn::Set(f, 0x1p-60f))));
+                               hn::And(sloped, hn::Gt(reach, hn::Set(f, 0x1p-60f))));
     packet.alive = ((1u << packet.count) - 1) & bits_of(usual);
     packet.extreme = ((1u << packet.count) - 1) & ~packet.alive;
     packet.ready = 0;

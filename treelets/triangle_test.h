@@ -135,7 +135,14 @@ inline BoxSpan cross_own_box(const RaySpace& ray, Lanes a, Lanes b, Lanes c) {
   float near[4], far[4];  // lo <= hi: so the lesser product is that of the near plane
   lanes_store(lanes_min(lanes_mul(lo, inverse), lanes_mul(hi, inverse)), near);
   lanes_store(lanes_max(lanes_mul(lo, far_inverse), lanes_mul(hi, far_inverse)), far);
-  return {std::max(0.0f, std::max(near[2], std::max(near[1], near[0]))), std::min(far[2], std::min(far[1], far[0]))};
+  constexpr float kMax = std::numeric_limits<float>::max();
+  if (ray.extreme) [[unlikely]] {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(ray.inverse[axis]) == kMax) far[axis] *= kMax;
+    }
+  }
+  return {std::max(0.0f, std::max(near[2], std::max(near[1], near[0]))),
+          std::min(std::min(far[2], std::min(far[1], far[0])), kMax)};
 }
 
 }  // namespace triangle_test

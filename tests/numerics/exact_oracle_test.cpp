@@ -205,7 +205,7 @@ TEST(AgainstExact, WhateverTheScale) {
 
 TEST(AgainstExact, WhateverTheLengthOfDirections) {
   for (const TriangleTest test : kBounded) {
-    for (const int power : {-90, -60, 60, 110}) {
+    for (const int power : {-125, -110, -90, -60, 60, 110}) {
       const auto stretch = [power](std::vector<TestTriangle>&, std::vector<Ray>& rays, std::mt19937&) {
         for (Ray& ray : rays) ray.direction *= std::ldexp(1.0f, power);
       };
