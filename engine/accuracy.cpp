@@ -58,6 +58,7 @@ class Measurement {
     SHOAL_RETURN_IF_ERROR(settle_sizes());
     SHOAL_RETURN_IF_ERROR(settle_reference());
     SHOAL_RETURN_IF_ERROR(measure({"base", "", base_}));
+    SHOAL_ASSIGN_OR_RETURN(control_seconds_, take_control());
     for (const AccuracyKnob& knob : result.knobs) SHOAL_RETURN_IF_ERROR(measure_knob(knob));
     SHOAL_RETURN_IF_ERROR(measure_together());
     mark_front();
@@ -265,22 +266,42 @@ class Measurement {
       SHOAL_ASSIGN_OR_RETURN(TakenPicture picture, take(scene, planned.settings, number, row.name));
       taken.push_back(std::move(picture));
     }
-    note_times(taken, scene, row);
+    row.build_seconds = scene.build_seconds;
+    row.file_bytes = scene.scene->file->file_bytes();
+    row.bytes_a_triangle = ratio(row.file_bytes, scene.scene->header.triangles_count);
+    if (!row.base) SHOAL_RETURN_IF_ERROR(note_pace(row));  // the scene of the row is closed then
+    note_times(taken, row);
     note_errors(std::move(taken), row);
     result.rows.push_back(std::move(row));
     return {};
   }
 
-  static void note_times(const std::vector<TakenPicture>& taken, const AccuracyScene& scene, AccuracyRow& row) {
+  /// Seconds of the base, now.
+  Result<double> take_control() {
+    SHOAL_ASSIGN_OR_RETURN(const AccuracyScene scene, scene_of(base_));
+    const uint64_t seed = spread_seed(job_.base.picture.shading.seed, kRowSeeds, 0);
+    SHOAL_ASSIGN_OR_RETURN(const TakenPicture taken, take(scene, base_, seed, "base"));
+    return taken.seconds;
+  }
+
+  /// The base stands between every two rows: what else the machine does changes while they are rendered, and a row must not
+  /// be called slow for that.
+  Status note_pace(AccuracyRow& row) {
+    const double before = control_seconds_;
+    SHOAL_ASSIGN_OR_RETURN(control_seconds_, take_control());
+    row.machine_pace = (before + control_seconds_) / 2 / result.base().seconds;
+    return {};
+  }
+
+  static void note_times(const std::vector<TakenPicture>& taken, AccuracyRow& row) {
     std::vector<const TakenPicture*> by_time;
     for (const TakenPicture& picture : taken) by_time.push_back(&picture);
     std::sort(by_time.begin(), by_time.end(), [](auto* a, auto* b) { return a->seconds < b->seconds; });
     const TakenPicture& median = *by_time[(by_time.size() - 1) / 2];
-    row.seconds = median.seconds, row.disk_read_bytes = median.disk_read_bytes, row.order = median.order;
-    row.seconds_min = by_time.front()->seconds, row.seconds_max = by_time.back()->seconds;
-    row.build_seconds = scene.build_seconds;
-    row.file_bytes = scene.scene->file->file_bytes();
-    row.bytes_a_triangle = ratio(row.file_bytes, scene.scene->header.triangles_count);
+    row.seconds = median.seconds / row.machine_pace;
+    row.seconds_min = by_time.front()->seconds / row.machine_pace;
+    row.seconds_max = by_time.back()->seconds / row.machine_pace;
+    row.disk_read_bytes = median.disk_read_bytes, row.order = median.order;
   }
 
   void note_errors(std::vector<TakenPicture> taken, AccuracyRow& row) {
@@ -347,6 +368,7 @@ class Measurement {
   std::optional<FlipReference> flip_;
   CropPlace crop_;
   uint64_t samples_done_ = 0, samples_total_ = 0;
+  double control_seconds_ = 0;  ///< of the base, when it was rendered last
 };
 
 }  // namespace

@@ -61,7 +61,10 @@ struct AccuracyRow {
   uint32_t samples = 0;
   bool base = false;    ///< nothing is turned
   bool pareto = false;  ///< no other row has less of both seconds and relMSE
-  double seconds = 0, seconds_min = 0, seconds_max = 0;  ///< of a render: median and range over the seeds
+  /// Of a render, median and range over the seeds, divided by machine_pace: what they would be had the machine been as fast
+  /// as when the base was rendered.
+  double seconds = 0, seconds_min = 0, seconds_max = 0;
+  double machine_pace = 1;  ///< seconds that the base took when rendered again before and after this row, over its own
   std::optional<double> build_seconds;
   uint64_t disk_read_bytes = 0;  ///< of the render that took the median time
   uint64_t file_bytes = 0;

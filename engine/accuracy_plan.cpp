@@ -55,7 +55,10 @@ RenderPace pace_of(uint64_t pixels, uint32_t few, double few_seconds, uint32_t m
 AccuracyWork accuracy_work(const std::vector<AccuracyKnob>& knobs, const AccuracySettings& base, uint32_t seeds,
                            uint32_t reference_samples) {
   AccuracyWork work;
-  const auto add = [&](uint64_t samples) { work.renders += seeds, work.samples += samples * seeds; };
+  // Each row with its seeds, and the base once more after it.
+  const auto add = [&](uint64_t samples) {
+    work.renders += seeds + 1, work.samples += samples * seeds + base.picture.samples;
+  };
   add(base.picture.samples);
   for (const AccuracyKnob& knob : knobs) {
     for (size_t i = 0; i < knob.values.size(); ++i) {
@@ -68,7 +71,7 @@ AccuracyWork accuracy_work(const std::vector<AccuracyKnob>& knobs, const Accurac
   // The combinations: three numbers of samples each.
   constexpr uint64_t kCombinations = 2;
   for (uint64_t i = 0; i < kCombinations; ++i) add(base.picture.samples * 21 / 4);
-  work.renders += 2 * kCombinations * seeds;
+  work.renders += 2 * kCombinations * (seeds + 1), work.samples += 2 * kCombinations * base.picture.samples;
   if (reference_samples > 0) work.renders += 1, work.samples += reference_samples;
   return work;
 }

@@ -59,6 +59,7 @@ TEST(Accuracy, WritesItsFilesAndPrintsItsRows) {
     }
     if (row["name"] == "bounces 1") few_is_biased = row["biased"];
     EXPECT_GT(row["render_seconds"], 0);
+    EXPECT_GT(row["machine_pace"], 0);
     EXPECT_GT(row["file_bytes_per_triangle"], 0);
   }
   EXPECT_TRUE(few_is_biased);

@@ -97,6 +97,7 @@ TEST_F(Accuracy, RowsAreWhatTheirColumnsSay) {
     EXPECT_EQ(row.settings.size(), result.knobs.size()) << row.name;
     EXPECT_LE(row.seconds_min, row.seconds);
     EXPECT_LE(row.seconds, row.seconds_max);
+    EXPECT_GT(row.machine_pace, 0) << row.name;
     EXPECT_LE(row.rel_mse_min, row.rel_mse);
     EXPECT_LE(row.rel_mse, row.rel_mse_max);
     EXPECT_LE(row.rel_mse, row.rel_mse_all) << "the trimmed mean leaves the largest out";
