@@ -1,16 +1,16 @@
-// Rays a second through a scene in memory: our treelets against Embree's rtcIntersect1, incoherent rays, one
-// thread.
+// Rays a second through a scene in memory: our treelets by each triangle test (what the robust path costs) beside Embree's
+// rtcIntersect1, as it comes and robust. Incoherent rays, one thread.
 //   bench_trace [triangles, default 1000000] [rays, default 300000] [treelet KiB, default 256] [soup|mesh]
 // soup: triangles that share nothing, about as large as their distance; mesh: nested bumpy spheres, vertices
-// shared. Prints a line a program: million rays a second, and for ours tests and treelets a ray. One warm-up,
-// median of five.
-#include <embree3/rtcore.h>
+// shared. Prints a line a contender: million rays a second, its time beside that of the default test, and for ours tests
+// and treelets a ray. They take turns: one warm-up, then the median of five.
 #include <fmt/format.h>
 #include <time.h>
 
 #include <cstdlib>
 
 #include "tests/support/built_scene.h"
+#include "tests/support/embree_peer.h"
 
 namespace shoal::testing {
 namespace {
@@ -22,23 +22,12 @@ double thread_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-double median_seconds(const std::function<void()>& work) {
-  std::vector<double> seconds;
-  for (int run = 0; run < 6; ++run) {
-    const double start = thread_seconds();
-    work();
-    seconds.push_back(thread_seconds() - start);
-  }
-  std::sort(seconds.begin() + 1, seconds.end());
-  return seconds[3];
-}
-
 /// Rays traced together.
 constexpr size_t kGroup = 64;
 
 /// Each ray to its end, a treelet of each at a time.
 void trace_group(const TestScene& scene, const TopTree& tree, std::span<Ray> rays, uint64_t& top_tests,
-                 uint64_t& visits, TraceCounters& counters) {
+                 uint64_t& visits, TraceCounters& counters, TriangleTest test) {
   RayContext contexts[kGroup];
   NextJob next[kGroup];
   uint32_t count = 0;
@@ -58,7 +47,7 @@ void trace_group(const TestScene& scene, const TopTree& tree, std::span<Ray> ray
     }
     count = left;
     visits += count;
-    trace_treelets({jobs, count}, counters);
+    trace_treelets({jobs, count}, counters, test);
     left = 0;
     for (uint32_t k = 0; k < count; ++k) {
       if (!next[k].ray->any_hit() || !next[k].ray->hit.valid()) next[left++] = next[k];
@@ -67,64 +56,59 @@ void trace_group(const TestScene& scene, const TopTree& tree, std::span<Ray> ray
   }
 }
 
-void run_ours(const TestScene& scene, const std::vector<Ray>& rays) {
+/// Of all rays.
+struct Work {
+  uint64_t hits = 0, top_tests = 0, visits = 0;
+  TraceCounters inside;
+};
+
+Work run_ours(const TestScene& scene, const std::vector<Ray>& rays, TriangleTest test) {
   const TopTree tree(scene.nodes, scene.entries, scene.instances);
-  TraceCounters counters;
-  uint64_t top_tests = 0, visits = 0, hits = 0;
-  const double seconds = median_seconds([&] {
-    counters = {}, top_tests = visits = hits = 0;
-    std::vector<Ray> group;
-    for (size_t first = 0; first < rays.size(); first += kGroup) {
-      group.assign(rays.begin() + static_cast<long>(first),
-                   rays.begin() + static_cast<long>(std::min(first + kGroup, rays.size())));
-      trace_group(scene, tree, group, top_tests, visits, counters);
-      for (const Ray& ray : group) hits += ray.hit.valid();
-    }
-  });
-  const double n = static_cast<double>(rays.size());
-  fmt::print(
-      "ours    {:.3f} Mrays/s  hits {:.3f}  top nodes {:.1f}  treelets {:.2f}  nodes {:.1f}  triangles {:.1f}\n",
-      n / seconds * 1e-6, static_cast<double>(hits) / n, static_cast<double>(top_tests) / n,
-      static_cast<double>(visits) / n, static_cast<double>(counters.node_tests_count) / n,
-      static_cast<double>(counters.triangle_tests_count) / n);
+  Work work;
+  std::vector<Ray> group;
+  for (size_t first = 0; first < rays.size(); first += kGroup) {
+    group.assign(rays.begin() + static_cast<long>(first),
+                 rays.begin() + static_cast<long>(std::min(first + kGroup, rays.size())));
+    trace_group(scene, tree, group, work.top_tests, work.visits, work.inside, test);
+    for (const Ray& ray : group) work.hits += ray.hit.valid();
+  }
+  return work;
 }
 
-void run_embree(const std::vector<TestTriangle>& triangles, const std::vector<Ray>& rays) {
-  RTCDevice device = rtcNewDevice("threads=2");
-  RTCScene scene = rtcNewScene(device);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-  RTCGeometry mesh = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(
-      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3 * triangles.size()));
-  auto* indices = static_cast<uint32_t*>(
-      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
-  for (size_t i = 0; i < 3 * triangles.size(); ++i) {
-    std::memcpy(vertices + 3 * i, &triangles[i / 3].p[i % 3], 12);
-    indices[i] = static_cast<uint32_t>(i);
+struct Contender {
+  std::string name;
+  std::function<Work()> trace;
+  bool ours = false;
+  Work work{};
+  std::vector<double> seconds{};  ///< of each round
+  double median() const {
+    std::vector<double> sorted = seconds;
+    std::sort(sorted.begin(), sorted.end());
+    return sorted[sorted.size() / 2];
   }
-  rtcCommitGeometry(mesh);
-  rtcAttachGeometry(scene, mesh);
-  rtcReleaseGeometry(mesh);
-  rtcCommitScene(scene);
-  uint64_t hits = 0;
-  const double seconds = median_seconds([&] {
-    hits = 0;
-    for (const Ray& ray : rays) {
-      RTCRayHit query{};
-      query.ray.org_x = ray.origin.x, query.ray.org_y = ray.origin.y, query.ray.org_z = ray.origin.z;
-      query.ray.dir_x = ray.direction.x, query.ray.dir_y = ray.direction.y, query.ray.dir_z = ray.direction.z;
-      query.ray.tfar = ray.t, query.ray.mask = 0xffffffffu;
-      query.hit.geomID = query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-      RTCIntersectContext context;
-      rtcInitIntersectContext(&context);
-      rtcIntersect1(scene, &context, &query);
-      hits += query.hit.primID != RTC_INVALID_GEOMETRY_ID;
+};
+
+void compete(std::vector<Contender>& contenders) {
+  constexpr int kRounds = 6;
+  for (int round = 0; round < kRounds; ++round) {
+    for (Contender& contender : contenders) {
+      const double start = thread_seconds();
+      contender.work = contender.trace();
+      if (round > 0) contender.seconds.push_back(thread_seconds() - start);
     }
-  });
-  fmt::print("Embree  {:.3f} Mrays/s  hits {:.3f}\n", static_cast<double>(rays.size()) / seconds * 1e-6,
-             static_cast<double>(hits) / static_cast<double>(rays.size()));
-  rtcReleaseScene(scene);
-  rtcReleaseDevice(device);
+  }
+}
+
+void print(const Contender& contender, double default_seconds, double rays) {
+  const Work& work = contender.work;
+  const auto each = [rays](uint64_t count) { return static_cast<double>(count) / rays; };
+  fmt::print("{:<16} {:.3f} Mrays/s  time {:.3f}  hits {:.4f}", contender.name, rays / contender.median() * 1e-6,
+             contender.median() / default_seconds, each(work.hits));
+  if (contender.ours) {
+    fmt::print("  top nodes {:.1f}  treelets {:.2f}  nodes {:.1f}  triangles {:.1f}", each(work.top_tests),
+               each(work.visits), each(work.inside.node_tests_count), each(work.inside.triangle_tests_count));
+  }
+  fmt::print("\n");
 }
 
 /// Eight nested bumpy spheres.
@@ -151,8 +135,19 @@ void run(size_t triangle_count, size_t ray_count, uint32_t treelet_bytes, bool m
   for (const AlignedPage& page : scene.pages) bytes += page.bytes().size();
   fmt::print("{} triangles, {} treelets, {:.1f} bytes a triangle, {} top nodes\n", soup.size(), scene.pages.size(),
              static_cast<double>(bytes) / static_cast<double>(soup.size()), scene.nodes.size());
-  run_ours(scene, rays);
-  run_embree(soup, rays);
+  const EmbreePeer plain(soup, false), robust(soup, true);
+  const auto embree = [&rays](const EmbreePeer& peer) { return Work{rays.size() - peer.misses(rays), 0, 0, {}}; };
+  std::vector<Contender> contenders;
+  for (const TriangleTest test : {TriangleTest::kWatertight, TriangleTest::kFast, TriangleTest::kDouble}) {
+    contenders.push_back({"ours, " + std::string(triangle_test_name(test)), [&, test] { return run_ours(scene, rays, test); },
+                          true});
+  }
+  contenders.push_back({"Embree", [&] { return embree(plain); }});
+  contenders.push_back({"Embree, robust", [&] { return embree(robust); }});
+  compete(contenders);
+  for (const Contender& contender : contenders) {
+    print(contender, contenders[0].median(), static_cast<double>(rays.size()));
+  }
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // count what Embree, as it comes and robust, lets through. `[numerics]` lines are the table of docs/numerics.md.
 #include <gtest/gtest.h>
 
-#include "tests/numerics/embree_peer.h"
+#include "tests/support/embree_peer.h"
 #include "tests/numerics/every_kernel.h"
 #include "tests/numerics/watertight_meshes.h"
 #include "tests/support/built_scene.h"

@@ -1,60 +1,16 @@
 // Against Embree, and against daylight: nothing leaks through a closed mesh.
-#include <embree3/rtcore.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/embree_peer.h"
 #include "tests/support/hand_made_scene.h"
 
 namespace shoal::testing {
 namespace {
 
-/// An Embree scene over the same triangles, robust.
-class EmbreeScene {
- public:
-  explicit EmbreeScene(const std::vector<TestTriangle>& triangles) : device_(rtcNewDevice("threads=1")) {
-    scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-    RTCGeometry mesh = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(
-        rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3 * triangles.size()));
-    auto* indices = static_cast<uint32_t*>(
-        rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
-    for (size_t i = 0; i < 3 * triangles.size(); ++i) {
-      std::memcpy(vertices + 3 * i, &triangles[i / 3].p[i % 3], 12);
-      indices[i] = static_cast<uint32_t>(i);
-    }
-    rtcCommitGeometry(mesh);
-    rtcAttachGeometry(scene_, mesh);
-    rtcReleaseGeometry(mesh);
-    rtcCommitScene(scene_);
-  }
-  ~EmbreeScene() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-  }
-  /// Primitive hit, or kNoIndex; sets t.
-  uint32_t intersect(const Ray& ray, float& t) const {
-    RTCRayHit query{};
-    query.ray.org_x = ray.origin.x, query.ray.org_y = ray.origin.y, query.ray.org_z = ray.origin.z;
-    query.ray.dir_x = ray.direction.x, query.ray.dir_y = ray.direction.y, query.ray.dir_z = ray.direction.z;
-    query.ray.tfar = ray.t;
-    query.ray.mask = 0xffffffffu;
-    query.hit.geomID = query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(scene_, &context, &query);
-    t = query.ray.tfar;
-    return query.hit.primID;
-  }
-
- private:
-  RTCDevice device_;
-  RTCScene scene_;
-};
-
 void compare_with_embree(const std::vector<TestTriangle>& triangles, std::mt19937& random) {
   const TestScene scene = make_scene({triangles}, {{0, {}}}, {300, 4});
   const TopTree tree(scene.nodes, scene.entries, scene.instances);
-  const EmbreeScene embree(triangles);
+  const EmbreePeer embree(triangles, true);
   constexpr int kRays = 30000;
   int hits = 0, differences = 0;
   for (int i = 0; i < kRays; ++i) {

@@ -1,4 +1,4 @@
-// Embree over the same triangles, as it comes or robust, for tables of leaks beside ours. One thread.
+// Embree over the same triangles, as it comes or robust, beside ours in tests and bench. One thread.
 #pragma once
 
 #include <embree3/rtcore.h>
