@@ -1,33 +1,16 @@
 #include "io/png_image.h"
 
 #include <fmt/format.h>
-#include <png.h>
 
-#include <csetjmp>
-#include <cstdio>
 #include <cstring>
 
-// libpng reports errors by longjmp. Every function below that calls setjmp holds plain data only, so that no
-// destructor is skipped; what it fills is owned by its caller.
+#include "io/png_reader.h"
+
+// What functions that call setjmp fill is owned by their caller (io/png_reader.h).
 
 namespace shoal {
 
 namespace {
-
-constexpr png_uint_32 kMaxSide = 1u << 20;
-constexpr png_alloc_size_t kMaxChunkBytes = 8u << 20;  // of text, profiles and the like, which nobody reads
-constexpr png_uint_32 kMaxChunks = 256;
-
-struct Message {
-  char text[160] = "";
-};
-
-void on_error(png_structp png, png_const_charp text) {
-  std::snprintf(static_cast<Message*>(png_get_error_ptr(png))->text, sizeof Message::text, "%s", text);
-  png_longjmp(png, 1);
-}
-
-void on_warning(png_structp, png_const_charp) {}
 
 struct Source {
   const std::byte* next;
@@ -42,35 +25,13 @@ void on_read(png_structp png, png_bytep out, size_t n) {
   source->left -= n;
 }
 
-/// Owns libpng's reading state.
-struct Reader {
-  explicit Reader(std::span<const std::byte> bytes) : source{bytes.data(), bytes.size()} {
-    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
-    if (png != nullptr) info = png_create_info_struct(png);
-  }
-  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+using Reader = PngReader<Source>;
 
-  Message message;
-  Source source;
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-};
-
-/// Reads up to the pixels and asks for 8-bit RGBA, whatever the file holds.
 bool read_header(Reader& reader, bool& has_alpha) {
   if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
-  png_set_read_fn(reader.png, &reader.source, on_read);
-  png_set_user_limits(reader.png, kMaxSide, kMaxSide);
-  png_set_chunk_malloc_max(reader.png, kMaxChunkBytes);
-  png_set_chunk_cache_max(reader.png, kMaxChunks);
-  png_read_info(reader.png, reader.info);
+  begin_png(reader, on_read);
   has_alpha = (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_ALPHA) != 0 ||
               png_get_valid(reader.png, reader.info, PNG_INFO_tRNS) != 0;
-  png_set_expand(reader.png);
-  png_set_strip_16(reader.png);
-  png_set_gray_to_rgb(reader.png);
   png_set_add_alpha(reader.png, 0xff, PNG_FILLER_AFTER);
   return true;
 }
@@ -90,14 +51,14 @@ bool read_pixels(Reader& reader, uint32_t width, uint32_t height, uint8_t* rgba)
 
 struct Writer {
   Writer() {
-    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
+    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, on_png_error, on_png_warning);
     if (png != nullptr) info = png_create_info_struct(png);
   }
   ~Writer() { png_destroy_write_struct(&png, &info); }
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
-  Message message;
+  PngMessage message;
   std::vector<std::byte> bytes;
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -130,7 +91,7 @@ bool is_png(std::span<const std::byte> bytes) {
 }
 
 Result<Image8> decode_png(std::span<const std::byte> bytes, const std::string& name, uint64_t max_pixels) {
-  Reader reader(bytes);
+  Reader reader({bytes.data(), bytes.size()});
   if (reader.info == nullptr) return Error{ErrorCode::kInternal, name + ": libpng cannot start"};
   Image8 image;
   if (!read_header(reader, image.has_alpha)) {

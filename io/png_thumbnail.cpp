@@ -1,20 +1,15 @@
 #include "io/png_thumbnail.h"
 
 #include <fmt/format.h>
-#include <png.h>
 
 #include <algorithm>
 #include <array>
-#include <csetjmp>
-#include <cstdio>
 #include <cstring>
 
-// libpng reports errors by longjmp. Functions that call setjmp, and those that libpng calls, hold plain data only.
+#include "io/png_reader.h"
 
 namespace shoal {
 namespace {
-
-constexpr png_uint_32 kMaxSide = 1u << 20;
 
 /// The file, a block at a time.
 struct Source {
@@ -23,12 +18,14 @@ struct Source {
   size_t at = 0, filled = 0;
   std::array<std::byte, 64u << 10> block;
 
+  bool failed = false;  ///< the storage, not the PNG
   bool refill() {
     filled = static_cast<size_t>(std::min<uint64_t>(block.size(), file->size_bytes() - offset));
     at = 0;
-    if (filled == 0 || !file->read_at(offset, std::span(block).first(filled)).ok()) return false;
+    if (filled == 0) return false;
+    failed = !file->read_at(offset, std::span(block).first(filled)).ok();
     offset += filled;
-    return true;
+    return !failed;
   }
 };
 
@@ -42,41 +39,10 @@ void on_read(png_structp png, png_bytep out, size_t n) {
   }
 }
 
-struct Message {
-  char text[160] = "";
-};
-
-void on_error(png_structp png, png_const_charp text) {
-  std::snprintf(static_cast<Message*>(png_get_error_ptr(png))->text, sizeof Message::text, "%s", text);
-  png_longjmp(png, 1);
-}
-
-void on_warning(png_structp, png_const_charp) {}
-
-struct Reader {
-  Reader() {
-    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
-    if (png != nullptr) info = png_create_info_struct(png);
-  }
-  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
-
-  Message message;
-  Source source;
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-};
-
-bool read_header(Reader& reader) {
+bool read_header(PngReader<Source>& reader) {
   if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
-  png_set_read_fn(reader.png, &reader.source, on_read);
-  png_set_user_limits(reader.png, kMaxSide, kMaxSide);
-  png_read_info(reader.png, reader.info);
+  begin_png(reader, on_read);
   if (png_get_interlace_type(reader.png, reader.info) != PNG_INTERLACE_NONE) png_error(reader.png, "rows out of order");
-  png_set_expand(reader.png);
-  png_set_strip_16(reader.png);
-  png_set_gray_to_rgb(reader.png);
   png_set_strip_alpha(reader.png);
   png_read_update_info(reader.png, reader.info);
   if (png_get_rowbytes(reader.png, reader.info) != size_t{3} * png_get_image_width(reader.png, reader.info)) {
@@ -85,7 +51,7 @@ bool read_header(Reader& reader) {
   return true;
 }
 
-bool read_row(Reader& reader, uint8_t* row) {
+bool read_row(PngReader<Source>& reader, uint8_t* row) {
   if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
   png_read_row(reader.png, row, nullptr);
   return true;
@@ -96,9 +62,10 @@ bool read_row(Reader& reader, uint8_t* row) {
 Result<Thumbnail> shrink_png(FileSystem& fs, const std::string& path, uint32_t max_side) {
   SHOAL_CHECK(max_side > 0);
   SHOAL_ASSIGN_OR_RETURN(const auto file, fs.open(path, ReadMode::kBuffered));
-  const auto reader = std::make_unique<Reader>();
+  const auto reader = std::make_unique<PngReader<Source>>();
   reader->source.file = file.get();
   const auto refused = [&] {
+    if (reader->source.failed) return Error{ErrorCode::kStorage, path + ": cannot be read"};
     return Error{ErrorCode::kInput, fmt::format("{}: expected a PNG, found: {}", path, reader->message.text)};
   };
   if (reader->info == nullptr || !read_header(*reader)) return refused();

@@ -8,24 +8,15 @@
 #include "engine/build_scene.h"
 #include "engine/generate.h"
 #include "engine/render.h"
-#include "io/page_cache.h"
+#include "tests/support/render_variation.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/written_scene.h"
 
 namespace shoal::testing {
 namespace {
 
-struct Variation {
-  const char* name;
-  Order order = Order::kQueued;
-  unsigned threads = 2;
-  uint64_t rays_in_flight = 0;
-  bool smallest_cache = false;
-  bool preview = false;
-};
-
-const Variation kPlain{.name = "depth-first, one thread", .order = Order::kDepthFirst, .threads = 1};
-const Variation kVariations[] = {
+const RenderVariation kPlain{.name = "depth-first, one thread", .order = Order::kDepthFirst, .threads = 1};
+const RenderVariation kVariations[] = {
     {.name = "depth-first, smallest cache", .order = Order::kDepthFirst, .threads = 3, .smallest_cache = true},
     {.name = "queued", .threads = 3},
     {.name = "queued, one block of rays", .threads = 1, .rays_in_flight = 64},
@@ -102,23 +93,12 @@ class AdaptiveRender : public ::testing::Test {
     build(folder / "scene.gltf");
   }
 
-  RenderResult rendered(const Variation& v = {.name = "", .order = Order::kHybrid}) {
-    const ReadMode mode = v.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
-    const auto scene = open_scene(posix_file_system(), folder / "scene.shoal", mode, {});
+  RenderResult rendered(const RenderVariation& v = {.name = "", .order = Order::kHybrid}) {
     ExecutionOptions execution;
-    execution.order = v.order;
-    execution.threads = v.threads;
-    execution.rays_in_flight = v.rays_in_flight;
     execution.time_limit_seconds = time_limit;
-    if (v.smallest_cache) {
-      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
-    }
-    if (v.preview) execution.preview.path = folder / "preview.png";
-    auto result = render(posix_file_system(), scene.value(), picture, execution);
-    if (!result.ok()) throw std::runtime_error(result.error().message);
-    return std::move(result).value();
+    return render_variation(folder, picture, v, execution);
   }
-  RenderResult adaptive(float median, uint32_t most, const Variation& v = {.name = "", .order = Order::kHybrid}) {
+  RenderResult adaptive(float median, uint32_t most, const RenderVariation& v = {.name = "", .order = Order::kHybrid}) {
     picture.noise = {median, 2 * median};
     picture.samples = most;
     return rendered(v);
@@ -185,7 +165,7 @@ TEST_F(AdaptiveRender, EveryOrderDrawsTheSameSamples) {
   const RenderResult expected = adaptive(0.2f, 48, kPlain);
   EXPECT_LT(expected.samples.least, expected.samples.most) << "a picture of equal samples proves little";
   EXPECT_GT(expected.samples.passes_count, 2u);
-  for (const Variation& v : kVariations) {
+  for (const RenderVariation& v : kVariations) {
     const RenderResult actual = adaptive(0.2f, 48, v);
     EXPECT_EQ(actual.rgba, expected.rgba) << v.name;
     EXPECT_EQ(actual.standard_errors, expected.standard_errors) << v.name;

@@ -9,22 +9,13 @@
 #include "engine/build_scene.h"
 #include "engine/generate.h"
 #include "engine/render.h"
-#include "io/page_cache.h"
+#include "tests/support/render_variation.h"
 #include "tests/support/temporary_folder.h"
 
 namespace shoal::testing {
 namespace {
 
-struct Variation {
-  const char* name;
-  Order order = Order::kQueued;
-  unsigned threads = 2;
-  uint64_t rays_in_flight = 0;
-  bool smallest_cache = false;
-  bool preview = false;
-};
-
-const Variation kVariations[] = {
+const RenderVariation kVariations[] = {
     {.name = "depth-first, smallest cache", .order = Order::kDepthFirst, .threads = 3, .smallest_cache = true},
     {.name = "queued", .threads = 3},
     {.name = "queued, one block of rays", .threads = 1, .rays_in_flight = 64},
@@ -53,21 +44,9 @@ class AovOrders : public ::testing::Test {
     picture_.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(0.5f), {}};
   }
 
-  RenderResult rendered(const char* aovs, const Variation& v) {
-    const ReadMode mode = v.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
-    const auto scene = open_scene(posix_file_system(), folder_ / "scene.shoal", mode, {});
-    ExecutionOptions execution;
-    execution.order = v.order;
-    execution.threads = v.threads;
-    execution.rays_in_flight = v.rays_in_flight;
-    if (v.smallest_cache) {
-      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
-    }
-    if (v.preview) execution.preview.path = folder_ / "preview.png";
+  RenderResult rendered(const char* aovs, const RenderVariation& v) {
     picture_.aovs = parse_aovs(aovs).value();
-    auto result = render(posix_file_system(), scene.value(), picture_, execution);
-    if (!result.ok()) throw std::runtime_error(result.error().message);
-    return std::move(result).value();
+    return render_variation(folder_, picture_, v);
   }
 
   static const ExrChannel& layer(const RenderResult& result, const std::string& name) {
@@ -82,7 +61,7 @@ class AovOrders : public ::testing::Test {
 
   /// Every layer but that of bytes has the bits of depth-first on one thread.
   void expect_one_picture() {
-    const Variation plain{.name = "", .order = Order::kDepthFirst, .threads = 1};
+    const RenderVariation plain{.name = "", .order = Order::kDepthFirst, .threads = 1};
     const RenderResult bare = rendered("", plain), expected = rendered("all", plain);
     EXPECT_EQ(bare.rgba, expected.rgba) << "the colour does not depend on layers";
     for (const ExrChannel& channel : expected.layers) {
@@ -90,7 +69,7 @@ class AovOrders : public ::testing::Test {
       for (const uint32_t integer : channel.integers) content += integer;
       EXPECT_NE(content, 0) << channel.name << ": an empty layer proves nothing";
     }
-    for (const Variation& v : kVariations) {
+    for (const RenderVariation& v : kVariations) {
       const RenderResult actual = rendered("all", v);
       EXPECT_EQ(actual.rgba, expected.rgba) << v.name;
       ASSERT_EQ(actual.layers.size(), expected.layers.size());
@@ -130,7 +109,7 @@ TEST_F(AovOrders, AgreeOnInstances) {
 
 TEST_F(AovOrders, OneLayerIsThatOfAll) {
   build("terrain", 5000);
-  const Variation plain{.name = "", .order = Order::kDepthFirst, .threads = 1};
+  const RenderVariation plain{.name = "", .order = Order::kDepthFirst, .threads = 1};
   const RenderResult all = rendered("all", plain);
   for (const std::string& name : aov_names(parse_aovs("all").value())) {
     const RenderResult one = rendered(name.c_str(), plain);

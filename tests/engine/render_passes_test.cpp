@@ -5,22 +5,13 @@
 #include "engine/build_scene.h"
 #include "engine/generate.h"
 #include "engine/render.h"
-#include "io/page_cache.h"
+#include "tests/support/render_variation.h"
 #include "tests/support/temporary_folder.h"
 
 namespace shoal::testing {
 namespace {
 
-struct Variation {
-  const char* name;
-  Order order;
-  unsigned threads = 2;
-  uint64_t rays_in_flight = 0;
-  bool smallest_cache = false;
-  bool preview = false;
-};
-
-const Variation kVariations[] = {
+const RenderVariation kVariations[] = {
     {.name = "depth-first", .order = Order::kDepthFirst},
     {.name = "queued", .order = Order::kQueued, .threads = 3},
     {.name = "queued, smallest cache", .order = Order::kQueued, .rays_in_flight = 2000, .smallest_cache = true},
@@ -46,22 +37,11 @@ class RenderPasses : public ::testing::Test {
     picture_.aovs = parse_aovs("albedo,samples,variance,object_id").value();
   }
 
-  RenderResult rendered(const Variation& v, uint32_t samples, double limit_seconds) {
-    const ReadMode mode = v.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
-    const auto scene = open_scene(posix_file_system(), folder_ / "scene.shoal", mode, {});
+  RenderResult rendered(const RenderVariation& v, uint32_t samples, double limit_seconds) {
     ExecutionOptions execution;
-    execution.order = v.order;
-    execution.threads = v.threads;
-    execution.rays_in_flight = v.rays_in_flight;
     execution.time_limit_seconds = limit_seconds;
-    if (v.smallest_cache) {
-      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
-    }
-    if (v.preview) execution.preview.path = folder_ / "preview.png";
     picture_.samples = samples;
-    auto result = render(posix_file_system(), scene.value(), picture_, execution, hooks_);
-    if (!result.ok()) throw std::runtime_error(result.error().message);
-    return std::move(result).value();
+    return render_variation(folder_, picture_, v, execution, hooks_);
   }
 
   TemporaryFolder folder_;
@@ -70,7 +50,7 @@ class RenderPasses : public ::testing::Test {
 };
 
 TEST_F(RenderPasses, ATimeLimitGivesThePictureOfTheSamplesThatItReports) {
-  for (const Variation& v : kVariations) {
+  for (const RenderVariation& v : kVariations) {
     const RenderResult limited = rendered(v, 1u << 22, 0.3);
     EXPECT_EQ(limited.samples.least, limited.samples.most) << v.name;
     EXPECT_EQ(limited.samples.mean, limited.samples.most) << v.name;
@@ -90,7 +70,7 @@ TEST_F(RenderPasses, ATimeLimitGivesThePictureOfTheSamplesThatItReports) {
 }
 
 TEST_F(RenderPasses, ALimitThatIsLongEnoughRendersAllSamplesInManyPasses) {
-  for (const Variation& v : kVariations) {
+  for (const RenderVariation& v : kVariations) {
     const RenderResult limited = rendered(v, 6, 1e6);
     EXPECT_EQ(limited.samples.most, 6u) << v.name;
     EXPECT_EQ(limited.samples.passes_count, 3u) << v.name << ": 1, 3, 2";
