@@ -6,10 +6,13 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "bins/choice_option.h"
 #include "bins/command.h"
+#include "bins/compare_kinds.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
 
@@ -21,6 +24,7 @@ struct Arguments {
   std::vector<std::string> orders{"queued", "depth-first"};
   std::string out;
   uint32_t runs = 1;
+  KindArguments kinds;
 };
 
 struct OrderResult {
@@ -78,13 +82,19 @@ Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& pre
 /// What can be said before the scene is read; makes the folder.
 Status check_arguments(const Arguments& arguments) {
   for (const std::string& name : arguments.orders) SHOAL_RETURN_IF_ERROR(parse_order(name));
+  if (auto kinds = parse_kinds(arguments.kinds, arguments.runs); !kinds.ok()) return std::move(kinds).error();
   std::error_code code;
   std::filesystem::create_directories(arguments.out, code);
   if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", arguments.out, code.message())};
   return check_output(arguments.out + "/compare.json");
 }
 
-Status write_report(const Arguments& arguments, const PreparedRender& prepared, const Comparison& comparison) {
+Status write_text(const std::string& path, const std::string& text) {
+  return write_whole_file(posix_file_system(), path, std::as_bytes(std::span(text)));
+}
+
+Status write_report(const Arguments& arguments, const PreparedRender& prepared, const Comparison& comparison,
+                    const std::optional<KindTable>& kinds) {
   nlohmann::ordered_json json;
   json["schema_version"] = 1;
   json["pictures_identical"] = comparison.identical;
@@ -95,8 +105,12 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
         stats_json(order.median(), prepared.scene, prepared.picture, order.execution));
     for (const RenderResult& run : order.runs) stats["run_seconds"].push_back(run.seconds);
   }
-  const std::string text = json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  return write_whole_file(posix_file_system(), arguments.out + "/compare.json", std::as_bytes(std::span(text)));
+  if (kinds) {
+    json["ray_kinds"] = nlohmann::ordered_json::parse(kinds_json(*kinds));
+    SHOAL_RETURN_IF_ERROR(write_text(arguments.out + "/kinds.csv", kinds_csv(*kinds)));
+  }
+  return write_text(arguments.out + "/compare.json",
+                    json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 int run_compare(const Arguments& arguments, Console& console) {
@@ -112,12 +126,25 @@ int run_compare(const Arguments& arguments, Console& console) {
   for (const OrderResult& order : comparison.orders) {
     columns.push_back({std::string(order_name(order.execution.order)), &order.median()});
   }
-  const Status written = write_report(arguments, prepared.value(), comparison);
+  std::optional<KindTable> kinds;
+  if (arguments.kinds.asked()) {
+    const KindOptions options = parse_kinds(arguments.kinds, arguments.runs).value();
+    auto table = compare_kinds(prepared.value(), orders, options, console);
+    if (!table.ok()) return console.error(table.error());
+    kinds = std::move(table).value();
+  }
+  const Status written = write_report(arguments, prepared.value(), comparison, kinds);
   if (!written.ok()) return console.error(written.error());
   fmt::print("{}", traffic_table(columns));
   fmt::print("{:<34}{:>16}\n", "pictures", comparison.identical ? "identical" : "DIFFERENT");
-  if (comparison.identical) return 0;
-  return console.error({ErrorCode::kInternal, "the orders gave different pictures: this is a bug"});
+  if (kinds) fmt::print("{}", kinds_text(*kinds));
+  if (!comparison.identical) {
+    return console.error({ErrorCode::kInternal, "the orders gave different pictures: this is a bug"});
+  }
+  if (kinds && !kinds->identical()) {
+    return console.error({ErrorCode::kInternal, "the orders gave different hits to the same rays: this is a bug"});
+  }
+  return 0;
 }
 
 }  // namespace
@@ -133,6 +160,7 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--runs", arguments->runs, "of each order, in turns; the one of median time is shown")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  arguments->kinds.declare(*sub);
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_compare(*arguments, console); };
   });

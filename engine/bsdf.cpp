@@ -77,7 +77,9 @@ BsdfValue Bsdf::evaluate(const Vec3& wi) const {
 BsdfSample Bsdf::sample(float u_lobe, float u1, float u2) const {
   if (black()) return {};
   Vec3 wi;
+  RayBirth birth = RayBirth::kDiffuse;
   if (u_lobe < specular_probability_) {
+    birth = birth_of_reflection(ggx_.alpha);
     const Vec3 h = ggx_.sample_visible_normal(wo_, u1, u2);
     wi = glm::normalize(2 * glm::dot(wo_, h) * h - wo_);
   } else {
@@ -90,7 +92,7 @@ BsdfSample Bsdf::sample(float u_lobe, float u1, float u2) const {
   // An overflow here (grazing by the last ulp) is no direction either, but it is counted.
   if (!std::isfinite(value.pdf)) return {.finite = false};
   if (!(value.pdf > 0)) return {};
-  return {world, value.value / value.pdf, value.pdf};
+  return {world, value.value / value.pdf, value.pdf, true, birth};
 }
 
 }  // namespace shoal

@@ -13,6 +13,7 @@
 #include "engine/energy_table.h"
 #include "engine/frame.h"
 #include "engine/microfacet.h"
+#include "engine/ray_birth.h"
 #include "treelets/vector.h"
 
 namespace shoal {
@@ -39,6 +40,7 @@ struct BsdfSample {
   Vec3 weight{0};     ///< value / pdf
   float pdf = 0;      ///< 0: no direction, the path ends
   bool finite = true;  ///< false: it ends because its density is no number
+  RayBirth birth = RayBirth::kDiffuse;  ///< the lobe that drew it
 };
 
 class Bsdf {

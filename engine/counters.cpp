@@ -78,9 +78,8 @@ std::vector<CounterInfo> counter_list() {
   return list;
 }
 
-Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
+Status check_traffic_identities(const RenderCounters& c, uint64_t samples_expected) {
   const RayCounters rays = c.total();
-  const RayCounters camera = c.of_kind(RayKind::kCamera);
   SHOAL_RETURN_IF_ERROR(expect_equal("page_requests_count", c.page_requests_count, "hits + misses",
                                      c.page_hits_count + c.page_misses_count));
   SHOAL_RETURN_IF_ERROR(expect_equal("misses + prefetches", c.page_misses_count + c.page_prefetches_count, "loads of treelets, attributes, textures",
@@ -93,8 +92,12 @@ Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
                                      rays.ray_hits_count + rays.ray_misses_count));
   SHOAL_RETURN_IF_ERROR(expect_equal("samples_started_count", c.samples_started_count, "samples_committed_count",
                                      c.samples_committed_count));
-  SHOAL_RETURN_IF_ERROR(
-      expect_equal("samples_committed_count", c.samples_committed_count, "samples asked for", samples_expected));
+  return expect_equal("samples_committed_count", c.samples_committed_count, "samples asked for", samples_expected);
+}
+
+Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
+  SHOAL_RETURN_IF_ERROR(check_traffic_identities(c, samples_expected));
+  const RayCounters camera = c.of_kind(RayKind::kCamera);
   SHOAL_RETURN_IF_ERROR(
       expect_equal("camera rays_traced_count", camera.rays_traced_count, "samples asked for", samples_expected));
   SHOAL_RETURN_IF_ERROR(expect_equal("invalid_samples_count", c.invalid_samples_count, "the sum of its terms",

@@ -97,6 +97,9 @@ std::vector<CounterInfo> counter_list();
 /// Fails with: kInternal naming the identity and both numbers.
 Status check_identities(const RenderCounters& counters, uint64_t samples_expected);
 
+/// Those of them that hold of a list of rays as well: `samples_expected` of them.
+Status check_traffic_identities(const RenderCounters& counters, uint64_t samples_expected);
+
 /// {"totals": {...}, "by_kind": {...}, "by_bounce": [...]} as JSON text.
 std::string counters_json(const RenderCounters& counters);
 

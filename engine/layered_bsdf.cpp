@@ -285,15 +285,15 @@ Vec3 LayeredBsdf::sample_glass(float u_choice, float u1, float u2) const {
 LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2) const {
   const auto reflect = [](const Vec3& wo, const Vec3& h) { return glm::normalize(2 * glm::dot(wo, h) * h - wo); };
   // Where the drawing lobe does not count (evaluate_world), another that does must not answer for it.
-  const auto on_side = [&](const Vec3& wi, bool there) {
+  const auto on_side = [&](const Vec3& wi, bool there, RayBirth birth = RayBirth::kDiffuse) {
     const Vec3 world = frame_.to_world(wi);
     const float side = glm::dot(geometric_normal_, world);
-    return there && (wi.z < 0 ? side < 0 : side > 0) ? Direction{wi, world} : Direction{};
+    return there && (wi.z < 0 ? side < 0 : side > 0) ? Direction{wi, world, birth} : Direction{};
   };
   if (u_lobe < probability_[kSpecular]) {
     const Vec3 wi = reflect(wo_, anisotropic_ ? stretched_.sample_visible_normal(wo_, u1, u2)
                                               : ggx_.sample_visible_normal(wo_, u1, u2));
-    return on_side(wi, wi.z > 0);
+    return on_side(wi, wi.z > 0, birth_of_reflection(anisotropic_ ? stretched_.alpha_x : ggx_.alpha));
   }
   float u = u_lobe - probability_[kSpecular];
   int lobe = kCoat;
@@ -308,7 +308,7 @@ LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2
       const Vec3 wi = reflect(coat_wo_, coat_ggx_.sample_visible_normal(coat_wo_, u1, u2));
       const Vec3 world = coat_frame_.to_world(wi);
       const bool there = wi.z > 0 && glm::dot(geometric_normal_, world) > 0;
-      return there ? Direction{frame_.to_local(world), world} : Direction{};
+      return there ? Direction{frame_.to_local(world), world, birth_of_reflection(coat_ggx_.alpha)} : Direction{};
     }
     case kSheenLobe: {
       const SinCos phi = sin_cos(2 * kPi * u2);
@@ -321,11 +321,11 @@ LayeredBsdf::Direction LayeredBsdf::sample_lobe(float u_lobe, float u1, float u2
     }
     case kThin: {
       const Vec3 wi = reflect(wo_, thin_ggx_.sample_visible_normal(wo_, u1, u2));
-      return on_side({wi.x, wi.y, -wi.z}, wi.z > 0);
+      return on_side({wi.x, wi.y, -wi.z}, wi.z > 0, RayBirth::kTransmission);
     }
     case kGlass: {
       const Vec3 wi = sample_glass(u / probability_[kGlass], u1, u2);
-      return on_side(wi, wi != Vec3(0));
+      return on_side(wi, wi != Vec3(0), wi.z < 0 ? RayBirth::kTransmission : birth_of_reflection(ggx_.alpha));
     }
     default: {
       const Vec3 wi = sample_cosine_hemisphere(u1, u2);
@@ -342,7 +342,7 @@ BsdfSample LayeredBsdf::sample(float u_lobe, float u1, float u2) const {
   // An overflow here (grazing by the last ulp) is no direction either, but it is counted.
   if (!std::isfinite(value.pdf)) return {.finite = false};
   if (!(value.pdf > 0)) return {};
-  return {direction.world, value.value / value.pdf, value.pdf};
+  return {direction.world, value.value / value.pdf, value.pdf, true, direction.birth};
 }
 
 }  // namespace shoal

@@ -87,6 +87,7 @@ class LayeredBsdf {
   BsdfValue evaluate_world(const Vec3& world_wi, const Vec3& wi) const;
   struct Direction {
     Vec3 local{0}, world{0};  ///< both zero: none
+    RayBirth birth = RayBirth::kDiffuse;
   };
   Direction sample_lobe(float u_lobe, float u1, float u2) const;
   Vec3 sample_glass(float u_choice, float u1, float u2) const;  ///< local

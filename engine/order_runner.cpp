@@ -1,5 +1,7 @@
 #include "engine/order_runner.h"
 
+#include <fmt/format.h>
+
 #include "engine/aov_film.h"
 #include "engine/clock.h"
 
@@ -16,6 +18,18 @@ constexpr uint64_t kTextureTileWork = 64;
 constexpr uint64_t kTextureTileDemand = 1u << 14;
 
 }  // namespace
+
+Status check_policies(const ExecutionOptions& execution) {
+  if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
+    return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
+                                                fmt::join(drain_policy_names(), ", "))};
+  }
+  if (make_eviction_policy(execution.paging.eviction) == nullptr) {
+    return Error{ErrorCode::kUsage, fmt::format("unknown eviction '{}': expected one of {}", execution.paging.eviction,
+                                                fmt::join(eviction_policy_names(), ", "))};
+  }
+  return {};
+}
 
 OrderRunner::OrderRunner(const Scene& scene, const ExecutionOptions& execution, const MemoryPlan& plan,
                          uint64_t samples)
@@ -100,7 +114,8 @@ void OrderRunner::run_queued(RenderContext& context) {
       make_drain_policy(execution_.policy, scaled_policy(execution_.policy_options, execution_.paging, treelets,
                                                          plan_.paths_in_flight));
   AovFilm* const loads = context.aovs != nullptr && context.aovs->set().has(Aov::kBytes) ? context.aovs : nullptr;
-  TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_, loads);
+  TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_, loads,
+                             context.list == nullptr);
   render_queued(context, *queued_, scheduler, batches_);
   context.cache.finish_loads();  // which ask what waits
 }

@@ -14,6 +14,9 @@
 
 namespace shoal {
 
+/// Names of policies that there are. Fails with: kUsage.
+Status check_policies(const ExecutionOptions& execution);
+
 class OrderRunner {
  public:
   /// What is passed outlives it. `samples`: of the first pass.

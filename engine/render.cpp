@@ -35,15 +35,7 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   if (!(execution.time_limit_seconds >= 0)) {
     return Error{ErrorCode::kUsage, fmt::format("a time limit of {} s: must be more than 0", execution.time_limit_seconds)};
   }
-  if (make_drain_policy(execution.policy, execution.policy_options) == nullptr) {
-    return Error{ErrorCode::kUsage, fmt::format("unknown policy '{}': expected one of {}", execution.policy,
-                                                fmt::join(drain_policy_names(), ", "))};
-  }
-  if (make_eviction_policy(execution.paging.eviction) == nullptr) {
-    return Error{ErrorCode::kUsage, fmt::format("unknown eviction '{}': expected one of {}", execution.paging.eviction,
-                                                fmt::join(eviction_policy_names(), ", "))};
-  }
-  return {};
+  return check_policies(execution);
 }
 
 /// How often a render with a preview goes over the whole picture before the order of tiles begins: until every pixel has

@@ -87,12 +87,15 @@ struct RenderProgress {
   std::optional<double> seconds_left;  ///< as far as that can be told yet
 };
 
+class RayRecorder;
+
 struct RenderHooks {
   std::function<void(const MemoryPlan&)> planned;       ///< may be empty; called once, before work starts
   std::function<void(const ChosenOrder&)> chosen;       ///< may be empty; for Order::kAuto, once more when trials chose another time
   std::function<void(const RenderProgress&)> progress;  ///< may be empty; now and then, one call at a time
   std::function<void(const std::string&)> warning;      ///< may be empty; what went wrong and does not end the render
   const std::atomic<bool>* stop = nullptr;              ///< ends the render with kStopped when it becomes true
+  RayRecorder* recorder = nullptr;                      ///< takes every ray that is born (engine/ray_recorder.h); none: no cost
 };
 
 /// The samples that make up the pixels.

@@ -11,6 +11,8 @@
 #include "engine/aov_film.h"
 #include "engine/clock.h"
 #include "engine/preview.h"
+#include "engine/ray_list.h"
+#include "engine/ray_recorder.h"
 
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
@@ -87,6 +89,7 @@ void run_on_threads(RenderContext& context, const std::function<void(unsigned)>&
 
 RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
     : context_(context),
+      thread_(thread),
       phases_(context.phases[thread]),
       shader_(context.scene, context.tables, context.picture.shading, context.sampler, context.cache),
       camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
@@ -101,6 +104,7 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
 
 Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
   enter(Phase::kPaths);
+  if (context_.list != nullptr) return begin_listed(index, path_index, path);
   const PixelSample sample = context_.samples.at(index);
   path.pixel = sample.y * context_.picture.width + sample.x;
   path.sample = sample.sample;
@@ -132,6 +136,18 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   const float t_max = camera_ray.seen ? kRayInfinity : kRayNowhere;
   const Ray ray = make_ray(path_index, path, seeds_, path.origin, path.direction, t_max, false);
   ++ray_counters(ray).rays_traced_count;
+  if (context_.hooks.recorder != nullptr && camera_ray.seen) {
+    context_.hooks.recorder->add(thread_, RayBirth::kCamera, 0, path, ray);
+  }
+  return ray;
+}
+
+Ray RenderWorker::begin_listed(uint64_t index, uint32_t path_index, PathState& path) {
+  Ray ray = context_.list->begin(index, path);
+  ray.path = path_index | (context_.list->any_hit() ? Ray::kAnyHitBit : 0u);
+  ++counters_.samples_started_count;
+  counters_.path_state_moved_bytes += sizeof(PathState);
+  ++ray_counters(ray).rays_traced_count;
   return ray;
 }
 
@@ -147,7 +163,9 @@ bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
   ++rays.rays_finished_count;
   ++(ray.hit.valid() ? rays.ray_hits_count : rays.ray_misses_count);
   counters_.path_state_moved_bytes += sizeof(PathState);
-  if (ray.any_hit()) {
+  if (context_.list != nullptr) {
+    context_.list->finish(ray, path);
+  } else if (ray.any_hit()) {
     if (!ray.hit.valid()) path.radiance += path.shadow_radiance;
   } else {
     path.hit = ray.hit;
@@ -159,6 +177,13 @@ bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
 
 uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) {
   enter(Phase::kShading);
+  if (context_.list != nullptr) {
+    context_.list->find_point(path, context_.scene.top_tree, geometry_.bytes());
+    ++shade_counters_.vertices_shaded_count;
+    counters_.path_state_moved_bytes += sizeof(PathState);
+    path.flags &= ~uint32_t{kPathGoesOn};
+    return 0;
+  }
   const uint64_t waited_before = cache_counters_.waited_ticks;
   if (!pin_attributes()) return 0;
   const uint32_t bounce_before = path.bounce;
@@ -192,8 +217,16 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     rays[count++] = make_ray(path_index, path, seeds_, path.origin, path.direction, kRayInfinity, false);
   }
   for (uint32_t i = 0; i < count; ++i) ++ray_counters(rays[i]).rays_traced_count;
+  if (context_.hooks.recorder != nullptr) record(result, path, rays);
   path.pending.store(count, std::memory_order_relaxed);
   return count;
+}
+
+void RenderWorker::record(const ShadeResult& result, const PathState& path, const Ray* rays) const {
+  RayRecorder& recorder = *context_.hooks.recorder;
+  const uint32_t vertex = result.has_bounce ? path.bounce - 1 : path.bounce;
+  if (result.has_shadow) recorder.add(thread_, result.shadow_birth, vertex, path, *rays++);
+  if (result.has_bounce) recorder.add(thread_, result.bounce_birth, path.bounce, path, *rays);
 }
 
 void RenderWorker::shade_miss(PathState& path) {
@@ -207,6 +240,11 @@ bool RenderWorker::counts(uint32_t pixel, uint32_t sample) const {
 
 void RenderWorker::end_path(const PathState& path) {
   enter(Phase::kPaths);
+  if (context_.list != nullptr) {
+    ++counters_.samples_committed_count;
+    counters_.path_state_moved_bytes += sizeof(PathState);
+    return;
+  }
   Vec3 radiance = path.radiance;
   if (!std::isfinite(radiance.x) || !std::isfinite(radiance.y) || !std::isfinite(radiance.z)) {
     radiance = Vec3(0);
@@ -263,13 +301,13 @@ void RenderWorker::let_go() {
 }
 
 bool RenderWorker::attributes_at_hand() const {
-  if (attributes_of_ == in_hand_) return true;
+  if (attributes_of_ == in_hand_ || context_.list != nullptr) return true;
   const PageId page = context_.scene.treelets[in_hand_].attributes;
   return page == kNoPage || context_.cache.resident(page);
 }
 
 bool RenderWorker::pin_attributes() {
-  if (attributes_of_ == in_hand_) return true;
+  if (attributes_of_ == in_hand_ || context_.list != nullptr) return true;
   const PageId page = context_.scene.treelets[in_hand_].attributes;
   attributes_.reset();
   if (page != kNoPage) {

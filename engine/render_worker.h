@@ -21,6 +21,7 @@ namespace shoal {
 class AdaptiveSampling;
 class AovFilm;
 class Preview;
+class RayList;
 
 /// Samples begun together.
 struct SampleRange {
@@ -43,6 +44,7 @@ struct RenderContext {
   Preview* preview = nullptr;  ///< or none
   AovFilm* aovs = nullptr;     ///< or none
   AdaptiveSampling* adaptive = nullptr;  ///< or none: every sample counts
+  RayList* list = nullptr;  ///< or none; else sample i is its ray i, and there is no camera, no shading and no film
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -89,7 +91,7 @@ class RenderWorker {
   /// What this thread does from now on. The functions below that take long enter their phase themselves.
   void enter(Phase phase) { phases_.enter(phase); }
 
-  /// Begins sample `index` in `path`; returns its camera ray.
+  /// Begins sample `index` in `path`; returns its camera ray, or the ray of the list.
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
 
   /// Every ray of `group` goes on by one treelet; see RayGroup. `sending`: the phase of what `decide` does.
@@ -172,6 +174,9 @@ class RenderWorker {
   void hand_in();
 
  private:
+  Ray begin_listed(uint64_t index, uint32_t path_index, PathState& path);
+  /// Only where somebody records: `rays` are those of a vertex.
+  void record(const ShadeResult& result, const PathState& path, const Ray* rays) const;
   /// The vertex `bounce`, which was shaded, is what the path sought, or is looked through when it `goes_on`.
   void note_features(PathState& path, uint32_t bounce, bool goes_on);
   void end_features(const PathState& path, const Vec3& radiance);
@@ -179,6 +184,7 @@ class RenderWorker {
   void charge_loads_to(uint32_t pixel);
 
   RenderContext& context_;
+  const unsigned thread_;
   PhaseClock& phases_;
   Shader shader_;
   uint32_t camera_cone_;  ///< PathState::cone of a path that begins

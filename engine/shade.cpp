@@ -240,6 +240,7 @@ Status Shader::sample_light(PathState& path, const Surface& surface, const AnyBs
   if (path.shadow_radiance == Vec3(0)) return {};
 
   result.has_shadow = true;
+  result.shadow_birth = light.delta ? RayBirth::kPointShadow : RayBirth::kAreaShadow;
   result.shadow_origin = offset_point(surface.position, side);
   if (light.at_infinity) {
     result.shadow_direction = light.direction;
@@ -282,6 +283,7 @@ void Shader::sample_bounce(PathState& path, const Surface& surface, const AnyBsd
   }
   result.bounce_origin = offset_point(surface.position, side);
   result.bounce_direction = sample.direction;
+  result.bounce_birth = sample.birth;
 }
 
 const MaterialLayers& Shader::layers_of(const Material& material) const {

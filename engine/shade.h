@@ -12,6 +12,7 @@
 #include "engine/invalid_samples.h"
 #include "engine/light_choice.h"
 #include "engine/path_state.h"
+#include "engine/ray_birth.h"
 #include "engine/sampler.h"
 #include "engine/scene.h"
 #include "engine/shutter_times.h"
@@ -80,8 +81,10 @@ struct ShadeResult {
   bool has_shadow = false;
   Vec3 shadow_origin, shadow_direction;
   float shadow_t_max = 0;  ///< exclusive
+  RayBirth shadow_birth = RayBirth::kAreaShadow;
   bool has_bounce = false;
   Vec3 bounce_origin, bounce_direction;
+  RayBirth bounce_birth = RayBirth::kDiffuse;
 };
 
 struct ShadeCounters {

@@ -125,8 +125,8 @@ void TreeletScheduler::start_loads(CacheCounters& counters) {
 
 Prefetch TreeletScheduler::start_load(TreeletId treelet, CacheCounters& counters) {
   const TreeletPages& pages = scene_.treelets[treelet];
-  return pages.attributes == kNoPage ? cache_.prefetch(pages.geometry, counters)
-                                     : cache_.prefetch_pair(pages.geometry, counters);
+  return wants_attributes(pages) ? cache_.prefetch_pair(pages.geometry, counters)
+                                 : cache_.prefetch(pages.geometry, counters);
 }
 
 }  // namespace shoal

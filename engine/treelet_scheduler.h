@@ -51,26 +51,30 @@ class UsualBatches {
 
 class TreeletScheduler {
  public:
+  /// `shades`: attributes are wanted beside the geometry.
   TreeletScheduler(const Scene& scene, const QueuedPaths& paths, PageCache& cache, DrainPolicy& policy,
-                   UsualBatches& batches, std::span<const TreeletId> page_treelets, AovFilm* loads_aovs = nullptr)
+                   UsualBatches& batches, std::span<const TreeletId> page_treelets, AovFilm* loads_aovs = nullptr,
+                   bool shades = true)
       : scene_(scene),
         paths_(paths),
         cache_(cache),
         policy_(policy),
         batches_(batches),
         page_treelets_(page_treelets),
-        loads_aovs_(loads_aovs) {}
+        loads_aovs_(loads_aovs),
+        shades_(shades) {}
 
   /// The treelet to drain next, or kNoIndex: nothing is worth it yet, or what is wanted is still on its way.
   TreeletId choose(bool more_coming, CacheCounters& counters);
 
-  /// Geometry and attributes are there: draining it reads nothing.
+  /// Everything is there that is wanted of it: draining it reads nothing.
   bool resident(TreeletId treelet) const {
     const TreeletPages& pages = scene_.treelets[treelet];
-    return cache_.resident(pages.geometry) && (pages.attributes == kNoPage || cache_.resident(pages.attributes));
+    return cache_.resident(pages.geometry) && (!wants_attributes(pages) || cache_.resident(pages.attributes));
   }
 
  private:
+  bool wants_attributes(const TreeletPages& pages) const { return shades_ && pages.attributes != kNoPage; }
   TreeletId take_ready();
   void take_loaded();
   void decide(bool more_coming);
@@ -84,6 +88,7 @@ class TreeletScheduler {
   UsualBatches& batches_;
   std::span<const TreeletId> page_treelets_;
   AovFilm* loads_aovs_;  ///< where loads are charged to pixels, else none
+  bool shades_;
 
   std::mutex mutex_;
   Decision decision_;

@@ -30,7 +30,7 @@ TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
                   "--projection", "perspective, orthographic, equirectangular, fisheye", "--fov", "--ortho-height",
                   "--aperture", "--focus", "--distortion", "--time", "--animation",
                   "--triangle-test", "fast, watertight, double"}},
-      {"compare", {"--orders", "--out", "--runs", "--width", "--spp", "--max-memory"}},
+      {"compare", {"--orders", "--out", "--runs", "--kinds", "--kind-rays", "--width", "--spp", "--max-memory"}},
       {"accuracy", {"--out", "--budget", "--seeds", "--knobs", "--reference", "--reference-spp", "--width", "--max-memory",
                     "--camera", "--environment", "--exposure", "--order"}},
       {"info", {"--json"}},
