@@ -23,14 +23,16 @@ BuiltScene build_crowd(FileSystem& fs, MemoryFileSystem& memory) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> uniform(0, 1);
   const auto add_crowd = [&](uint32_t triangles) {
-    std::vector<float> positions;
+    std::vector<float> positions, normals;
     for (uint32_t i = 0; i < triangles; ++i) {
       const float center[3] = {4 * uniform(random), 4 * uniform(random), 4 * uniform(random)};
       for (int corner = 0; corner < 3; ++corner) {
         for (const float c : center) positions.push_back(c + 1.2f * uniform(random));
+        normals.insert(normals.end(), {0, 0, 1});  // attributes that no ray should ask for
       }
     }
-    return scene.add_mesh({{"attributes", {{"POSITION", scene.add_floats(3, positions)}}}});
+    const uint32_t position = scene.add_floats(3, positions), normal = scene.add_floats(3, normals);
+    return scene.add_mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}});
   };
   const uint32_t shared = add_crowd(150);
   scene.add_node({{"mesh", add_crowd(2000)}});
@@ -111,6 +113,7 @@ class TraceRays : public ::testing::Test {
 
 TEST_F(TraceRays, EqualBruteForceInEveryOrder) {
   const std::vector<QueryRay> rays = random_rays(3000);
+  ASSERT_GT(built_.scene.header.attribute_bytes, 0u);
   for (const RayQuery query : {RayQuery::kClosest, RayQuery::kAny}) {
     std::vector<RayHit> expected;
     for (const QueryRay& ray : rays) expected.push_back(brute_force(ray, query));
