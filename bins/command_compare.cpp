@@ -13,6 +13,7 @@
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/compare_kinds.h"
+#include "bins/order_choice.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
 
@@ -28,6 +29,7 @@ struct Arguments {
 };
 
 struct OrderResult {
+  std::string label;
   ExecutionOptions execution;
   std::vector<RenderResult> runs;  ///< without pictures
 
@@ -55,15 +57,15 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
 Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& prepared, Console& console) {
   Comparison comparison;
   std::vector<float> first;
-  for (const std::string& name : arguments.orders) {
-    comparison.orders.push_back({prepared.execution, {}});
-    SHOAL_ASSIGN_OR_RETURN(comparison.orders.back().execution.order, parse_order(name));
+  SHOAL_ASSIGN_OR_RETURN(const std::vector<OrderChoice> choices, parse_order_choices(arguments.orders));
+  for (const OrderChoice& choice : choices) {
+    comparison.orders.push_back({choice.label, prepared.execution, {}});
+    choice.apply(comparison.orders.back().execution);
   }
   for (uint32_t run = 0; run < arguments.runs; ++run) {
     for (OrderResult& order : comparison.orders) {
-      const std::string name(order_name(order.execution.order));
       RenderHooks hooks = console_hooks(console);
-      hooks.planned = [&](const MemoryPlan& plan) { console.info(name + ": " + describe_plan(plan)); };
+      hooks.planned = [&](const MemoryPlan& plan) { console.info(order.label + ": " + describe_plan(plan)); };
       auto result = render(posix_file_system(), prepared.scene, prepared.picture, order.execution, hooks);
       console.end_progress();
       if (!result.ok()) return std::move(result).error();
@@ -81,7 +83,7 @@ Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& pre
 
 /// What can be said before the scene is read; makes the folder.
 Status check_arguments(const Arguments& arguments) {
-  for (const std::string& name : arguments.orders) SHOAL_RETURN_IF_ERROR(parse_order(name));
+  SHOAL_RETURN_IF_ERROR(parse_order_choices(arguments.orders));
   if (auto kinds = parse_kinds(arguments.kinds, arguments.runs); !kinds.ok()) return std::move(kinds).error();
   std::error_code code;
   std::filesystem::create_directories(arguments.out, code);
@@ -100,7 +102,7 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
   json["pictures_identical"] = comparison.identical;
   json["runs_count"] = arguments.runs;
   for (const OrderResult& order : comparison.orders) {
-    auto& stats = json["orders"][std::string(order_name(order.execution.order))];
+    auto& stats = json["orders"][order.label];
     stats = nlohmann::ordered_json::parse(
         stats_json(order.median(), prepared.scene, prepared.picture, order.execution));
     for (const RenderResult& run : order.runs) stats["run_seconds"].push_back(run.seconds);
@@ -116,7 +118,8 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
 int run_compare(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
   std::vector<Order> orders;
-  for (const std::string& name : arguments.orders) orders.push_back(parse_order(name).value());
+  const std::vector<OrderChoice> choices = parse_order_choices(arguments.orders).value();
+  for (const OrderChoice& choice : choices) orders.push_back(choice.order);
   auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1 ? 1 : 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   const auto compared = render_orders(arguments, prepared.value(), console);
@@ -124,12 +127,12 @@ int run_compare(const Arguments& arguments, Console& console) {
   const Comparison& comparison = compared.value();
   std::vector<TrafficColumn> columns;
   for (const OrderResult& order : comparison.orders) {
-    columns.push_back({std::string(order_name(order.execution.order)), &order.median()});
+    columns.push_back({order.label, &order.median()});
   }
   std::optional<KindTable> kinds;
   if (arguments.kinds.asked()) {
     const KindOptions options = parse_kinds(arguments.kinds, arguments.runs).value();
-    auto table = compare_kinds(prepared.value(), orders, options, console);
+    auto table = compare_kinds(prepared.value(), choices, options, console);
     if (!table.ok()) return console.error(table.error());
     kinds = std::move(table).value();
   }
@@ -153,7 +156,7 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("compare", "the same picture in several orders, and what each moved");
   arguments->render.declare(*sub);
-  sub->add_option("--orders", arguments->orders, "comma-separated: " + choice_names(order_choices()))
+  sub->add_option("--orders", arguments->orders, "comma-separated, queued also with its policy (queued:full): " + choice_names(order_choices()))
       ->delimiter(',')
       ->capture_default_str();
   sub->add_option("--out", arguments->out, "folder for compare.json")->required();

@@ -91,7 +91,7 @@ bool KindTable::identical() const {
   return std::all_of(rows.begin(), rows.end(), [](const KindRow& row) { return row.identical; });
 }
 
-Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<Order>& orders,
+Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders,
                                 const KindOptions& options, Console& console) {
   const double start = now_seconds();
   RenderHooks hooks;
@@ -101,7 +101,10 @@ Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vecto
   SHOAL_ASSIGN_OR_RETURN(table.taken, take_kinds(posix_file_system(), prepared.scene, prepared.picture,
                                                  prepared.execution, options, hooks));
   std::vector<ExecutionOptions> executions(orders.size(), prepared.execution);
-  for (size_t i = 0; i < orders.size(); ++i) executions[i].order = orders[i];
+  for (size_t i = 0; i < orders.size(); ++i) {
+    orders[i].apply(executions[i]);
+    table.labels.push_back(orders[i].label);
+  }
   const auto done = [&](size_t rows, size_t of) {
     console.show_progress("kinds of rays", static_cast<double>(rows) / static_cast<double>(of), now_seconds() - start,
                           fmt::format("{} of {} lists", rows, of));
@@ -123,8 +126,9 @@ std::string kinds_json(const KindTable& table) {
     json["bounce"] = row.bounce;
     json["rays_count"] = row.rays_count;
     json["hits_identical"] = row.identical;
-    for (const KindInOrder& order : row.orders) {
-      Json& figures = json["orders"][std::string(order_name(order.order))];
+    for (size_t i = 0; i < row.orders.size(); ++i) {
+      const KindInOrder& order = row.orders[i];
+      Json& figures = json["orders"][table.labels[i]];
       for (const auto& [name, value] : columns_of(order)) {
         if (is_count(name)) {
           figures[name] = static_cast<uint64_t>(value);
@@ -145,14 +149,15 @@ std::string kinds_json(const KindTable& table) {
 std::string kinds_csv(const KindTable& table) {
   std::string text;
   for (const KindRow& row : table.rows) {
-    for (const KindInOrder& order : row.orders) {
+    for (size_t i = 0; i < row.orders.size(); ++i) {
+      const KindInOrder& order = row.orders[i];
       const auto columns = columns_of(order);
       if (text.empty()) {
         text = "kind,bounce,order";
         for (const auto& [name, value] : columns) text += fmt::format(",{}", name);
         text += "\n";
       }
-      text += fmt::format("{},{},{}", name_of(row.birth), row.bounce, order_name(order.order));
+      text += fmt::format("{},{},{}", name_of(row.birth), row.bounce, table.labels[i]);
       for (const auto& [name, value] : columns) {
         text += is_count(name) ? fmt::format(",{}", static_cast<uint64_t>(value)) : fmt::format(",{:.6g}", value);
       }
@@ -165,14 +170,15 @@ std::string kinds_csv(const KindTable& table) {
 std::string kinds_text(const KindTable& table) {
   std::string text = fmt::format("\nkinds of rays: {} paths, {} samples a pixel of one in {} tiles\n", table.taken.paths_count,
                                  table.taken.samples, table.taken.tile_sample);
-  text += fmt::format("{:<14}{:>3}{:>9}  {:<12}{:>9}{:>9}{:>8}{:>8}{:>8}{:>12}{:>10}\n", "kind", "at", "rays", "order",
+  text += fmt::format("{:<14}{:>3}{:>9}  {:<24}{:>9}{:>9}{:>8}{:>8}{:>8}{:>12}{:>10}\n", "kind", "at", "rays", "order",
                       "Mrays/s", "warm", "nodes", "tris", "visits", "bytes a ray", "rays/load");
   for (const KindRow& row : table.rows) {
     std::string kind = fmt::format("{:<14}{:>3}{:>9}", name_of(row.birth), row.bounce, row.rays_count);
-    for (const KindInOrder& order : row.orders) {
+    for (size_t i = 0; i < row.orders.size(); ++i) {
+      const KindInOrder& order = row.orders[i];
       const KindFigures& cold = order.cold();
-      text += fmt::format("{:<26}  {:<12}{:>9.3f}{:>9.3f}{:>8.1f}{:>8.1f}{:>8.2f}{:>12.0f}{:>10}\n", kind,
-                          order_name(order.order), million_rays_a_second(cold), million_rays_a_second(order.warm()),
+      text += fmt::format("{:<26}  {:<24}{:>9.3f}{:>9.3f}{:>8.1f}{:>8.1f}{:>8.2f}{:>12.0f}{:>10}\n", kind,
+                          table.labels[i], million_rays_a_second(cold), million_rays_a_second(order.warm()),
                           a_ray(cold.node_tests_count, cold), a_ray(cold.triangle_tests_count, cold),
                           a_ray(cold.treelet_visits_count, cold), a_ray(cold.disk_read_bytes, cold),
                           cold.treelet_loads_count > 0 ? fmt::format("{:.1f}", rays_a_load(cold)) : "-");

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bins/order_choice.h"
 #include "bins/render_options.h"
 #include "engine/ray_kinds.h"
 
@@ -27,13 +28,14 @@ Result<KindOptions> parse_kinds(const KindArguments& arguments, uint32_t runs);
 struct KindTable {
   TakenKinds taken;           ///< without its rays
   std::vector<KindRow> rows;
+  std::vector<std::string> labels;  ///< of the orders of each row
 
   bool identical() const;
 };
 
 /// Takes the rays and traces them in each of the orders, with progress. Fails with: what take_kinds() and trace_kinds()
 /// fail with.
-Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<Order>& orders,
+Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders,
                                 const KindOptions& options, Console& console);
 
 /// `ray_kinds` of compare.json, JSON text.

@@ -182,7 +182,12 @@ const std::map<std::string, Order>& order_choices() {
                                                      {"queued", Order::kQueued},
                                                      {"depth-first", Order::kDepthFirst},
                                                      {"sorted", Order::kSorted},
-                                                     {"hybrid", Order::kHybrid}};
+                                                     {"hybrid", Order::kHybrid},
+                                                     {"packet", Order::kPacket},
+                                                     {"packet-reorder", Order::kPacketReorder},
+                                                     {"stream", Order::kStream},
+                                                     {"depth-first-while-while", Order::kDepthFirstWhileWhile},
+                                                     {"depth-first-if-if", Order::kDepthFirstIfIf}};
   return kOrders;
 }
 
@@ -251,6 +256,10 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--queue-capacity", execution.policy_options.queue_capacity,
                  "policy full: rays and paths that fill a queue")
+      ->capture_default_str()
+      ->group("For experiments");
+  app.add_option("--packet-size", execution.packet_rays, "orders packet and packet-reorder: rays of a packet, 16 to 256")
+      ->check(CLI::IsMember({16u, 32u, 64u, 128u, 256u}))
       ->capture_default_str()
       ->group("For experiments");
   static const std::map<std::string, ReadBackend> kBackends{

@@ -103,6 +103,10 @@ Status check_identities(const RenderCounters& c, uint64_t samples_expected) {
   SHOAL_RETURN_IF_ERROR(expect_equal("invalid_samples_count", c.invalid_samples_count, "the sum of its terms",
                                      c.invalid_emission_count + c.invalid_environment_count + c.invalid_light_count +
                                          c.invalid_surface_count + c.invalid_bounce_count + c.invalid_path_count));
+  if (c.simd_active_lanes_count > c.simd_lanes_count) {
+    return Error{ErrorCode::kInternal, fmt::format("counters do not balance: {} active lanes of {} lanes",
+                                                   c.simd_active_lanes_count, c.simd_lanes_count)};
+  }
   const uint64_t vertices =
       c.of_kind(RayKind::kCamera).ray_hits_count + c.of_kind(RayKind::kBounce).ray_hits_count;
   return expect_equal("vertices_shaded_count", c.vertices_shaded_count, "hits of camera and bounce rays", vertices);

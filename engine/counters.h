@@ -41,6 +41,8 @@ namespace shoal {
   X(texture_lookups_count, "lookups", "texture look-ups")                                                     \
   X(texture_tiles_pinned_count, "tiles", "changes from a texture tile to another, a thread at a time")         \
   X(coverage_tests_count, "tests", "alpha coverage tests in traversal")                                       \
+  X(simd_lanes_count, "lanes", "lanes offered by tests in lock-step (docs/measuring.md says of which orders)")  \
+  X(simd_active_lanes_count, "lanes", "of those, lanes that had something to do")                             \
   X(clamped_samples_count, "samples", "contributions lowered to --clamp-direct or --clamp-indirect")           \
   X(invalid_samples_count, "samples", "contributions that were not finite: dropped; the sum of the next six")   \
   X(invalid_emission_count, "samples", "of those, emission that a path met")                                  \

@@ -9,7 +9,7 @@
 #include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
 #include "engine/film.h"
-#include "engine/hybrid_paths.h"
+#include "engine/streamed_paths.h"
 #include "engine/light_sampler.h"
 #include "engine/path_ray.h"
 #include "engine/preview.h"
@@ -107,7 +107,7 @@ unsigned read_depth_within(const PageFile& file, const PagingOptions& asked, uin
 uint64_t waiting_bytes(Order order, uint32_t treelet_count, uint32_t paths, unsigned threads) {
   const uint64_t queued = QueuedPaths::bytes(treelet_count, paths, threads);
   const uint64_t sorted = SortedPaths::bytes(paths, threads);
-  if (order == Order::kAuto) return std::max({queued, sorted, HybridPaths::bytes(treelet_count, threads)});
+  if (order == Order::kAuto) return std::max({queued, sorted, StreamedPaths::bytes(Order::kHybrid, treelet_count, threads)});
   return order == Order::kSorted ? sorted : queued;
 }
 
@@ -115,7 +115,7 @@ uint64_t waiting_bytes(Order order, uint32_t treelet_count, uint32_t paths, unsi
 Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const PictureOptions& picture,
                              const ExecutionOptions& execution) {
   const bool queued = order == Order::kQueued || order == Order::kAuto;
-  const bool waits = order != Order::kDepthFirst && order != Order::kHybrid;
+  const bool waits = !is_depth_first(order) && !needs_every_page(order);
   const unsigned threads = execution.threads > 0 ? execution.threads : std::max(1u, std::thread::hardware_concurrency());
   const uint64_t samples = uint64_t{picture.width} * picture.height * picture.samples;
   MemoryPlan plan = fixed_parts(scene, picture, execution, threads);
@@ -132,13 +132,13 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
   if (execution.rays_in_flight > 0) asked_paths = std::max<uint64_t>(asked_paths, kRaysPerBlock / 2);
   const uint64_t least_paths = asked_paths > 0 ? asked_paths : std::min<uint64_t>(kMinimumPaths, samples);
   uint64_t least_pages = std::max(least_cache, execution.page_cache_bytes);
-  if (order == Order::kHybrid) {
+  if (needs_every_page(order)) {
     least_pages = std::max(plan.scene_page_bytes(), execution.page_cache_bytes);
-    plan.ray_bytes = HybridPaths::bytes(scene.treelet_count, threads);
+    plan.ray_bytes = StreamedPaths::bytes(order, scene.treelet_count, threads);
     if (execution.page_cache_bytes > 0 && execution.page_cache_bytes < plan.scene_page_bytes()) {
       return Error{ErrorCode::kMemoryCap,
-                   fmt::format("a page cache of {} bytes cannot hold every page, as the hybrid order needs; the smallest "
-                               "that works is {} bytes", execution.page_cache_bytes, least_pages)};
+                   fmt::format("a page cache of {} bytes cannot hold every page, as the {} order needs; the smallest "
+                               "that works is {} bytes", execution.page_cache_bytes, order_name(order), least_pages)};
     }
   }
 
@@ -164,7 +164,7 @@ Result<MemoryPlan> share_out(Order order, const SceneSizes& scene, const Picture
                                     std::min<uint64_t>(samples, kMaxPathsInFlight), paths_bytes});
   }
   plan.paths_in_flight = static_cast<uint32_t>(waits ? paths : threads);
-  if (order == Order::kHybrid) plan.paths_in_flight = threads * HybridPaths::kPaths;
+  if (needs_every_page(order)) plan.paths_in_flight = threads * StreamedPaths::paths_of(order);
   if (waits) {
     plan.path_state_bytes = order == Order::kSorted
                                 ? SortedPaths::state_bytes(plan.paths_in_flight)

@@ -100,10 +100,21 @@ void OrderRunner::run_order(RenderContext& context, Order order) {
       sorted_ = std::make_unique<SortedPaths>(scene_.top_tree.bounds(), plan_.paths_in_flight, context.threads);
     }
     render_sorted(context, *sorted_);
-  } else if (order == Order::kHybrid) {
-    render_hybrid(context);
   } else {
-    render_depth_first(context);
+    run_without_waiting(context, order);
+  }
+}
+
+void OrderRunner::run_without_waiting(RenderContext& context, Order order) {
+  context.packet_rays = execution_.packet_rays;
+  switch (order) {
+    case Order::kHybrid: return render_hybrid(context);
+    case Order::kPacket: return render_packet(context);
+    case Order::kPacketReorder: return render_packet_reorder(context);
+    case Order::kStream: return render_stream(context);
+    case Order::kDepthFirstWhileWhile: return render_depth_first(context, InnerLoop::kWhileWhile);
+    case Order::kDepthFirstIfIf: return render_depth_first(context, InnerLoop::kIfIf);
+    default: return render_depth_first(context);
   }
 }
 

@@ -39,6 +39,7 @@ class OrderRunner {
   void run_order(RenderContext& context, Order order);
   OrderTrial try_order(RenderContext& context, Order order);
   void run_queued(RenderContext& context);
+  void run_without_waiting(RenderContext& context, Order order);
 
   const Scene& scene_;
   const ExecutionOptions& execution_;

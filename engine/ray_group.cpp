@@ -21,14 +21,14 @@ void RayGroup::address(const TopTree& tree) {
   }
 }
 
-uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleTest test) {
+uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
   TraceJob jobs[kCapacity];
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];
     jobs[i] = {member.page, &member.ray, &member.context, &tree.instance(member.ray.instance),
                tree.current(member.ray)};
   }
-  trace_treelets({jobs, size_}, counters, test);
+  trace_treelets({jobs, size_}, counters, test, loop);
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];
     member.node_tests += jobs[i].node_tests;

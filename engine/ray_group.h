@@ -84,7 +84,8 @@ class RayGroup {
     size_ = kept;
   }
   /// Traces every ray through the treelet that it stands on. Returns their number.
-  uint32_t trace(const TopTree& tree, TraceCounters& counters, TriangleTest test);
+  uint32_t trace(const TopTree& tree, TraceCounters& counters, TriangleTest test,
+                 InnerLoop loop = InnerLoop::kMoreNumerous);
 
  private:
   uint32_t size_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 #include <thread>
 
@@ -10,6 +11,7 @@
 #include "engine/clock.h"
 #include "engine/order_runner.h"
 #include "engine/preview.h"
+#include "treelets/scene_traversal.h"
 
 namespace shoal {
 namespace {
@@ -34,6 +36,11 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   SHOAL_RETURN_IF_ERROR(check_lens(camera_record(scene, picture), picture.lens));
   if (!(execution.time_limit_seconds >= 0)) {
     return Error{ErrorCode::kUsage, fmt::format("a time limit of {} s: must be more than 0", execution.time_limit_seconds)};
+  }
+  if (execution.packet_rays < kLeastPacketRays || execution.packet_rays > kMostPacketRays ||
+      !std::has_single_bit(execution.packet_rays)) {
+    return Error{ErrorCode::kUsage, fmt::format("packets of {} rays: expected a power of two from {} to {}",
+                                                execution.packet_rays, kLeastPacketRays, kMostPacketRays)};
   }
   return check_policies(execution);
 }
@@ -133,6 +140,11 @@ std::string_view order_name(Order order) {
     case Order::kDepthFirst: return "depth-first";
     case Order::kSorted: return "sorted";
     case Order::kHybrid: return "hybrid";
+    case Order::kPacket: return "packet";
+    case Order::kPacketReorder: return "packet-reorder";
+    case Order::kStream: return "stream";
+    case Order::kDepthFirstWhileWhile: return "depth-first-while-while";
+    case Order::kDepthFirstIfIf: return "depth-first-if-if";
   }
   return "";
 }

@@ -38,7 +38,28 @@ struct PictureOptions {
   AovSet aovs;  ///< layers beside the colour, which does not depend on them
 };
 
-enum class Order : uint8_t { kAuto, kQueued, kDepthFirst, kSorted, kHybrid };
+/// kPacket and what follows it trace in memory as kHybrid does; the last two are kDepthFirst by another inner loop.
+enum class Order : uint8_t {
+  kAuto,
+  kQueued,
+  kDepthFirst,
+  kSorted,
+  kHybrid,
+  kPacket,
+  kPacketReorder,
+  kStream,
+  kDepthFirstWhileWhile,
+  kDepthFirstIfIf,
+};
+
+/// By whichever inner loop.
+constexpr bool is_depth_first(Order order) {
+  return order == Order::kDepthFirst || order == Order::kDepthFirstWhileWhile || order == Order::kDepthFirstIfIf;
+}
+/// Only where the page cache has room for every page.
+constexpr bool needs_every_page(Order order) {
+  return order == Order::kHybrid || order == Order::kPacket || order == Order::kPacketReorder || order == Order::kStream;
+}
 
 std::string_view order_name(Order order);
 
@@ -64,6 +85,7 @@ struct ExecutionOptions {
   uint64_t rays_in_flight = 0;
   std::string policy = "resident-first";
   PolicyOptions policy_options;
+  uint32_t packet_rays = 64;        ///< kPacket, kPacketReorder: rays of a packet, a power of two from 16 to 256
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
   PreviewOptions preview;

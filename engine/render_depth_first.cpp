@@ -151,8 +151,10 @@ class DepthFirstWorker {
 
 }  // namespace
 
-void render_depth_first(RenderContext& context) {
+void render_depth_first(RenderContext& context, InnerLoop loop) {
+  context.inner_loop = loop;
   run_on_threads(context, [&](unsigned thread) { std::make_unique<DepthFirstWorker>(context, thread)->run(); });
+  context.inner_loop = InnerLoop::kMoreNumerous;
 }
 
 }  // namespace shoal

@@ -164,6 +164,7 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
           {"order_reason", result.order.reason},
           {"policy", execution.policy},
           {"queue_capacity", execution.policy_options.queue_capacity},
+          {"packet_size", execution.packet_rays},
           {"rays_ahead", execution.policy_options.rays_ahead},
           {"eviction", execution.paging.eviction},
           {"read_depth", execution.paging.read_depth},
@@ -335,12 +336,14 @@ std::vector<std::string> number_warnings(const RenderCounters& c, uint32_t width
 
 std::string traffic_table(const std::vector<TrafficColumn>& columns) {
   std::string text = fmt::format("{:<34}", "");
-  for (const TrafficColumn& column : columns) text += fmt::format("{:>16}", column.title);
+  const auto width = [](const TrafficColumn& column) { return std::max<size_t>(16, column.title.size() + 2); };
+  for (const TrafficColumn& column : columns) text += fmt::format("{:>{}}", column.title, width(column));
   text += "\n";
   const auto row = [&](std::string_view name, auto&& value) {
     text += fmt::format("{:<34}", name);
     for (const TrafficColumn& column : columns) {
-      text += fmt::format("{:>16}", value(*column.result, column.result->counters, column.result->counters.total()));
+      text += fmt::format("{:>{}}", value(*column.result, column.result->counters, column.result->counters.total()),
+                          width(column));
     }
     text += "\n";
   };
@@ -373,6 +376,13 @@ std::string traffic_table(const std::vector<TrafficColumn>& columns) {
   row("ray bytes through queues", [](R, C c, T) { return format_bytes(c.ray_moved_bytes); });
   row("path state bytes touched", [](R, C c, T) { return format_bytes(c.path_state_moved_bytes); });
   row("rays", [](R, C, T t) { return fmt::format("{}", t.rays_traced_count); });
+  if (std::any_of(columns.begin(), columns.end(),
+                  [](const TrafficColumn& column) { return column.result->counters.simd_lanes_count > 0; })) {
+    row("lanes with work", [](R, C c, T) {
+      if (c.simd_lanes_count == 0) return std::string("-");
+      return fmt::format("{:.1f} %", 100 * ratio(c.simd_active_lanes_count, c.simd_lanes_count));
+    });
+  }
   row("page cache", [](R r, C, T) { return format_bytes(r.plan.cache_bytes); });
   row("seconds", [](R r, C, T) { return fmt::format("{:.2f}", r.seconds); });
   row("million rays a second", [](R r, C, T t) {

@@ -364,6 +364,8 @@ void RenderWorker::hand_in() {
   RenderCounters& c = counters_;
   add_cache_counters(cache_counters_, c);
   c.coverage_tests_count = trace_counters_.coverage_tests_count;
+  c.simd_lanes_count = trace_counters_.simd_lanes_count;
+  c.simd_active_lanes_count = trace_counters_.simd_active_lanes_count;
   c.vertices_shaded_count = shade_counters_.vertices_shaded_count;
   c.texture_lookups_count = shade_counters_.texture_lookups_count;
   c.texture_tiles_pinned_count = shader_.texture_tiles_pinned_count();

@@ -45,6 +45,8 @@ struct RenderContext {
   AovFilm* aovs = nullptr;     ///< or none
   AdaptiveSampling* adaptive = nullptr;  ///< or none: every sample counts
   RayList* list = nullptr;  ///< or none; else sample i is its ray i, and there is no camera, no shading and no film
+  InnerLoop inner_loop = InnerLoop::kMoreNumerous;  ///< of step(); set while no order runs, as the next
+  uint32_t packet_rays = 64;                        ///< ExecutionOptions
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -107,7 +109,7 @@ class RenderWorker {
       group.each([&](const Ray& ray) { count_treelets(pixel_of(ray), 1); });
     }
     counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_,
-                                                         context_.picture.shading.triangle_test);
+                                                         context_.picture.shading.triangle_test, context_.inner_loop);
   }
   /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
   void count_leaving(const GroupRay& member, TreeletId next);
@@ -208,10 +210,13 @@ class RenderWorker {
 void add_cache_counters(const CacheCounters& cache, RenderCounters& counters);
 
 /// The orders. Each returns when every sample is in the film or context.ended is set.
-void render_depth_first(RenderContext& context);
+void render_depth_first(RenderContext& context, InnerLoop loop = InnerLoop::kMoreNumerous);
 void render_sorted(RenderContext& context, SortedPaths& paths);
-/// Requires: a cache with room for every page.
+/// Requires: a cache with room for every page, as the next three.
 void render_hybrid(RenderContext& context);
+void render_packet(RenderContext& context);
+void render_packet_reorder(RenderContext& context);
+void render_stream(RenderContext& context);
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches);
 
 /// Runs `work(thread index)` on `threads` threads of a oneTBB arena.

@@ -29,6 +29,11 @@ inline constexpr uint32_t top_ref(const TopNode& node, uint32_t slot) {
 }
 inline constexpr ChildKind kind_of(uint32_t ref) { return static_cast<ChildKind>(ref >> kKindShift); }
 
+/// A top tree too deep or too large for the stacks: every ray goes the slow way.
+bool exceeds_stacks(const TopTree& tree);
+/// A scene's tables. Keeps references.
+SceneTables scene_tables(const TopTree& tree, PageTable pages, TriangleTest test);
+
 /// The page of a treelet, brought if need be; nullptr: it cannot be had.
 inline const std::byte* page_of(const SceneTables& tables, TreeletId treelet, RayStream& stream) {
   const std::byte* page = tables.pages[treelet];
@@ -38,6 +43,8 @@ inline const std::byte* page_of(const SceneTables& tables, TreeletId treelet, Ra
 /// Any ray, from its start but with the hit it has: slowly, by TopTree::next and trace_treelet. For rays whose numbers
 /// are too extreme for the kernels.
 RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, TraceCounters& counters);
+/// Every ray of the stream; of an empty scene, each is a miss.
+void trace_all_slowly(const SceneTables& tables, RayStream& stream, TraceCounters& counters);
 
 struct LaneTracer {
   LaneTracer();

@@ -32,6 +32,17 @@ class WithWaiting final : public RayStream {
 
 }  // namespace
 
+bool exceeds_stacks(const TopTree& tree) {
+  uint32_t deepest = 0;
+  for (const TopNode& node : tree.nodes()) deepest = std::max(deepest, node.level);
+  const size_t most = std::max({tree.nodes().size(), tree.entries().size(), size_t{tree.instance_count()}});
+  return 2 * (deepest + 1) > kMaxTopDepth || most > kIndexMask;  // of the tree over instances and of an object
+}
+
+SceneTables scene_tables(const TopTree& tree, PageTable pages, TriangleTest test) {
+  return {&tree, tree.nodes().data(), tree.entries().data(), tree.instances().data(), pages, test};
+}
+
 RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, TraceCounters& counters) {
   RayContext context;
   TraceCounters tests;
@@ -54,18 +65,19 @@ RayWork trace_slowly(const SceneTables& tables, Ray& ray, RayStream& stream, Tra
   return work;
 }
 
+void trace_all_slowly(const SceneTables& tables, RayStream& stream, TraceCounters& counters) {
+  const bool empty = tables.tree->nodes().empty();
+  while (Ray* ray = stream.next()) stream.done(*ray, empty ? RayWork() : trace_slowly(tables, *ray, stream, counters));
+}
+
 SceneTracer::SceneTracer(const TopTree& tree, PageTable pages, RayGrouping grouping, TriangleTest test)
     : tree_(tree),
       pages_(pages),
       grouping_(grouping),
       test_(test),
+      slow_(exceeds_stacks(tree)),
       lanes_(std::make_unique<LaneTracer>()),
-      packets_(std::make_unique<PacketTracer>()) {
-  uint32_t deepest = 0;
-  for (const TopNode& node : tree.nodes()) deepest = std::max(deepest, node.level);
-  const size_t most = std::max({tree.nodes().size(), tree.entries().size(), size_t{tree.instance_count()}});
-  slow_ = 2 * (deepest + 1) > kMaxTopDepth || most > kIndexMask;  // of the tree over instances and of an object
-}
+      packets_(std::make_unique<PacketTracer>()) {}
 
 SceneTracer::~SceneTracer() = default;
 
@@ -77,16 +89,8 @@ bool SceneTracer::use_packets() const {
 }
 
 void SceneTracer::trace(RayStream& stream, TraceCounters& counters) {
-  if (tree_.nodes().empty()) {
-    while (Ray* ray = stream.next()) stream.done(*ray, {});
-    return;
-  }
-  const SceneTables tables{&tree_, tree_.nodes().data(), tree_.entries().data(), tree_.instances().data(), pages_,
-                           test_};
-  if (slow_) {
-    while (Ray* ray = stream.next()) stream.done(*ray, trace_slowly(tables, *ray, stream, counters));
-    return;
-  }
+  const SceneTables tables = scene_tables(tree_, pages_, test_);
+  if (slow_ || tree_.nodes().empty()) return trace_all_slowly(tables, stream, counters);
   if (!use_packets()) {
     lanes_->trace(tables, ~uint64_t{0}, stream, counters);
     return;

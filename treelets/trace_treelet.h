@@ -18,7 +18,12 @@ struct TraceCounters {
   uint64_t node_tests_count = 0;  ///< 8-wide nodes tested, in treelets and top tree
   uint64_t triangle_tests_count = 0;
   uint64_t coverage_tests_count = 0;
+  /// Of traversals in lock-step: lanes that their steps offered, and lanes of those that had something to do.
+  uint64_t simd_lanes_count = 0, simd_active_lanes_count = 0;
 };
+
+/// In which turn rays that are traced together take their steps (treelets/inner_loops.h); the same hits whichever.
+enum class InnerLoop : uint8_t { kMoreNumerous, kWhileWhile, kIfIf };
 
 /// One ray at one treelet.
 struct TraceJob {
@@ -37,7 +42,8 @@ struct TraceJob {
 /// Any hit: on the first covered triangle with t < ray.t, ray.hit.instance is set and it returns at once.
 /// Requires: the page passed check_treelet(), entry.root passed check_root(), at least 64 readable bytes follow the
 /// page (as in PagePin::bytes). Adds the jobs' tests to `counters`.
-void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);
+void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight,
+                    InnerLoop loop = InnerLoop::kMoreNumerous);
 /// One ray. `instance` is the one that ray.instance names.
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,
                    TraceCounters& counters, TriangleTest test = TriangleTest::kWatertight);

@@ -5,6 +5,7 @@
 #include <hwy/highway.h>
 // clang-format on
 
+#include "treelets/inner_loops.h"
 #include "treelets/trace_other_kinds.h"
 #include "treelets/treelet_tracer-inl.h"
 
@@ -25,8 +26,10 @@ namespace shoal {
 
 HWY_EXPORT(trace);
 
-void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test) {
-  if (HWY_LIKELY(test == TriangleTest::kWatertight)) {
+void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
+  if (HWY_UNLIKELY(loop != InnerLoop::kMoreNumerous)) {
+    (loop == InnerLoop::kWhileWhile ? trace_while_while : trace_if_if)(jobs, counters, test);
+  } else if (HWY_LIKELY(test == TriangleTest::kWatertight)) {
     HWY_DYNAMIC_DISPATCH(trace)(jobs, counters);
   } else {
     trace_treelets_by(test, jobs, counters);

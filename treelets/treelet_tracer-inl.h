@@ -79,7 +79,7 @@ class Tracer {
     }
   }
 
- private:
+ protected:
   /// Puts the next job into the lane, if there is one.
   HWY_INLINE void start(uint32_t index) {
     while (next_job_ < jobs_.size()) {
@@ -179,6 +179,8 @@ class Tracer {
       }
     }
   }
+
+  static constexpr uint32_t kNodes = 0, kLeaves = 1;  // of waiting_, by kLeafBit
 
   std::span<TraceJob> jobs_;
   TraceCounters& counters_;

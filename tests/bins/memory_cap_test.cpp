@@ -44,7 +44,7 @@ void expect_smallest_works(const TemporaryFolder& folder, const std::vector<std:
 
 /// In every order, on one thread and on two.
 void expect_smallest_works_in_all_orders(const TemporaryFolder& folder, const std::vector<std::string>& render) {
-  for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "auto"}) {
+  for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "packet", "stream", "auto"}) {
     for (const char* threads : {"1", "2"}) {
       SCOPED_TRACE(std::string(order) + ", threads: " + threads);
       expect_smallest_works(folder, join(render, {"--quiet", "--order", order, "--threads", threads}));

@@ -239,6 +239,31 @@ TEST(RenderScene, CompareFindsTheOrdersIdentical) {
             report["orders"]["depth-first"]["counters"]["totals"]["rays_traced_count"]);
 }
 
+TEST(RenderScene, CompareTakesOrdersWithTheirPoliciesEachUnderItsName) {
+  const TemporaryFolder folder;
+  make_terrain(folder);
+  const std::vector<std::string> names{"queued:full", "queued:sweep", "queued", "packet", "packet-reorder", "stream",
+                                       "depth-first-while-while", "depth-first-if-if"};
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ",") + name;
+  const ProgramRun run = run_shoal(folder, join({"compare", folder / "terrain.shoal", "--orders", list, "--out",
+                                                 folder / "compare", "--packet-size", "32"}, tiny_picture()));
+  expect_exit(run, 0);
+  const json report = parsed(file_text(folder / "compare/compare.json"));
+  EXPECT_EQ(report["pictures_identical"], true);
+  EXPECT_EQ(report["orders"].size(), names.size());
+  for (const std::string& name : names) {
+    ASSERT_TRUE(report["orders"].contains(name)) << name;
+    const json& options = report["orders"][name]["options"];
+    const size_t colon = name.find(':');
+    EXPECT_EQ(options["order"], name.substr(0, colon));
+    EXPECT_EQ(options["policy"], colon == std::string::npos ? "resident-first" : name.substr(colon + 1));
+    EXPECT_EQ(options["packet_size"], 32);
+    EXPECT_THAT(run.out, HasSubstr(" " + name));
+  }
+  EXPECT_THAT(run.out, HasSubstr("lanes with work"));
+}
+
 TEST(RenderScene, AGltfIsBuiltOnceIntoTheCacheAndAgainWhenItChanges) {
   const TemporaryFolder folder;
   WrittenScene scene = one_triangle();

@@ -28,6 +28,7 @@ struct Variation {
   uint32_t queue_capacity = 4096;
   PagingOptions paging = {};
   bool preview = false;
+  uint32_t packet_rays = 64;
 };
 
 const Variation kVariations[] = {
@@ -62,6 +63,21 @@ const Variation kVariations[] = {
     {.name = "hybrid, one thread", .order = Order::kHybrid, .threads = 1},
     {.name = "hybrid, treelets of 4 KiB, with a preview", .treelet_bytes = 4u << 10, .order = Order::kHybrid,
      .threads = 3, .preview = true},
+    {.name = "packet", .order = Order::kPacket},
+    {.name = "packet, of 256, one thread", .order = Order::kPacket, .threads = 1, .packet_rays = 256},
+    {.name = "packet, of 16, treelets of 4 KiB, with a preview", .treelet_bytes = 4u << 10, .order = Order::kPacket,
+     .threads = 3, .preview = true, .packet_rays = 16},
+    {.name = "packet-reorder", .order = Order::kPacketReorder, .threads = 3},
+    {.name = "packet-reorder, of 256, treelets of 4 KiB", .treelet_bytes = 4u << 10, .order = Order::kPacketReorder,
+     .packet_rays = 256},
+    {.name = "stream", .order = Order::kStream, .threads = 1},
+    {.name = "stream, treelets of 4 KiB, with a preview", .treelet_bytes = 4u << 10, .order = Order::kStream,
+     .threads = 3, .preview = true},
+    {.name = "while-while", .order = Order::kDepthFirstWhileWhile},
+    {.name = "while-while, smallest cache", .order = Order::kDepthFirstWhileWhile, .threads = 3, .smallest_cache = true},
+    {.name = "if-if", .order = Order::kDepthFirstIfIf, .threads = 1},
+    {.name = "if-if, treelets of 4 KiB, smallest cache", .treelet_bytes = 4u << 10, .order = Order::kDepthFirstIfIf,
+     .smallest_cache = true},
     {.name = "sorted", .order = Order::kSorted},
     {.name = "sorted, waves of 32 paths", .order = Order::kSorted, .threads = 1, .rays_in_flight = 64},
     {.name = "sorted, more threads than processors", .order = Order::kSorted, .threads = 3, .rays_in_flight = 5000},
@@ -118,6 +134,7 @@ class RenderOrders : public ::testing::Test {
     execution.threads = v.threads;
     execution.rays_in_flight = v.rays_in_flight;
     execution.policy = v.policy;
+    execution.packet_rays = v.packet_rays;
     execution.policy_options.queue_capacity = v.queue_capacity;
     execution.paging = v.paging;
     if (v.smallest_cache) {
@@ -261,6 +278,20 @@ TEST_F(RenderOrders, CountEveryRayOfAScene) {
   EXPECT_LT(hybrid.node_tests_count, totals[0].node_tests_count) << "no node is met twice";
   EXPECT_NEAR(static_cast<double>(hybrid.triangle_tests_count) / static_cast<double>(totals[0].triangle_tests_count), 1,
               0.2) << "trials count on it";
+  for (const Order order : {Order::kPacket, Order::kPacketReorder, Order::kStream, Order::kDepthFirstWhileWhile,
+                            Order::kDepthFirstIfIf}) {
+    execution.order = order;
+    const auto other = render(posix_file_system(), scene.value(), picture, execution);
+    ASSERT_TRUE(other.ok()) << other.error().message;
+    const RenderCounters& counted = other.value().counters;
+    EXPECT_EQ(counted.total().rays_traced_count, totals[0].rays_traced_count);
+    EXPECT_EQ(counted.total().ray_hits_count, totals[0].ray_hits_count);
+    EXPECT_LT(counted.simd_active_lanes_count, counted.simd_lanes_count) << order_name(order);
+    EXPECT_GT(counted.simd_active_lanes_count, 0u) << order_name(order);
+    if (!is_depth_first(order)) continue;
+    EXPECT_EQ(counted.total().node_tests_count, totals[1].node_tests_count) << "the same steps in another turn";
+    EXPECT_EQ(counted.total().triangle_tests_count, totals[1].triangle_tests_count);
+  }
   EXPECT_GT(totals[0].rays_queued_count, totals[0].rays_traced_count / 2);
   EXPECT_EQ(totals[1].rays_queued_count, 0u);
   EXPECT_EQ(totals[2].rays_queued_count, 0u);

@@ -34,10 +34,10 @@ inline uint32_t append_object(TestScene& scene, const BuiltObject& object) {
   return base;
 }
 
-/// `position_step`: TriangleSoup's.
+/// `position_step`: TriangleSoup's. `coverage`: of material 0, which all triangles have.
 inline TestScene build_scene(std::vector<std::vector<TestTriangle>> objects,
                              const std::vector<Placement>& placements, uint32_t treelet_bytes,
-                             float position_step = 0) {
+                             float position_step = 0, const CoverageSource* coverage = nullptr) {
   TestScene scene;
   std::vector<BuiltObject> built;
   PageSink sink(scene.pages);
@@ -49,7 +49,7 @@ inline TestScene build_scene(std::vector<std::vector<TestTriangle>> objects,
       soup.primitive.push_back(t.primitive);
       soup.material.push_back(0);
     }
-    built.push_back(build_object(std::move(soup), {treelet_bytes}, nullptr, sink).value());
+    built.push_back(build_object(std::move(soup), {treelet_bytes}, coverage, sink).value());
   }
   std::vector<InstanceBounds> bounds;
   for (const Placement& placement : placements) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tests/support/hand_made_scene.h"
-#include "treelets/trace_scene.h"
+#include "treelets/scene_traversal.h"
 
 namespace shoal::testing {
 
@@ -53,6 +53,39 @@ inline std::vector<Ray> trace_together(const TopTree& tree, const TestScene& sce
   SceneTracer(tree, stream.table.data(), grouping, test).trace(stream, counters);
   EXPECT_EQ(stream.done_count, rays.size());
   EXPECT_LE(stream.brought, scene.pages.size());
+  return rays;
+}
+
+/// The ways of treelets/scene_traversal.h, packets of three sizes.
+struct TraversalWay {
+  const char* name;
+  std::unique_ptr<SceneTraversal> (*make)(const TopTree&, PageTable, TriangleTest);
+};
+inline constexpr TraversalWay kTraversalWays[] = {
+    {"packets of 16", [](const TopTree& tree, PageTable pages, TriangleTest test) {
+       return make_packet_traversal(tree, pages, test, 16);
+     }},
+    {"packets of 256", [](const TopTree& tree, PageTable pages, TriangleTest test) {
+       return make_packet_traversal(tree, pages, test, 256);
+     }},
+    {"reordered packets of 32", [](const TopTree& tree, PageTable pages, TriangleTest test) {
+       return make_reordering_traversal(tree, pages, test, 32);
+     }},
+    {"reordered packets of 256", [](const TopTree& tree, PageTable pages, TriangleTest test) {
+       return make_reordering_traversal(tree, pages, test, 256);
+     }},
+    {"streams", make_stream_traversal},
+};
+
+/// All of them from start to end: the rays at their ends. Adds to `counters`.
+inline std::vector<Ray> trace_by(const TraversalWay& way, const TopTree& tree, const TestScene& scene,
+                                 std::vector<Ray> rays, TraceCounters& counters,
+                                 TriangleTest test = TriangleTest::kWatertight) {
+  RayListStream stream(rays, scene);
+  way.make(tree, stream.table.data(), test)->trace(stream, counters);
+  EXPECT_EQ(stream.done_count, rays.size()) << way.name;
+  EXPECT_LE(stream.brought, scene.pages.size()) << way.name;
+  EXPECT_LE(counters.simd_active_lanes_count, counters.simd_lanes_count) << way.name;
   return rays;
 }
 

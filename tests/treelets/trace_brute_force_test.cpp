@@ -3,59 +3,13 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
+#include "tests/support/awkward_rays.h"
 #include "tests/support/built_scene.h"
 #include "tests/support/ray_list_stream.h"
 #include "treelets/trace_treelet_scalar.h"
 
 namespace shoal::testing {
 namespace {
-
-/// Rays of every awkward sort at a scene about [-1, 1]^3 in size.
-std::vector<Ray> awkward_rays(std::mt19937& random, const std::vector<TestTriangle>& triangles, size_t count) {
-  std::vector<Ray> rays;
-  std::uniform_real_distribution<float> uniform(0, 1);
-  while (rays.size() < count) {
-    const TestTriangle& aim = triangles[random() % triangles.size()];
-    Vec3 origin = random_vector(random, 2), direction = random_vector(random);
-    switch (rays.size() % 10) {
-      case 0:
-        break;
-      case 1:  // along an axis
-        direction = Vec3(0), direction[static_cast<int>(random() % 3)] = random() % 2 ? 1.0f : -1.0f;
-        origin = aim.p[0] - direction * 3.0f;
-        break;
-      case 2:  // at a vertex
-        direction = aim.p[random() % 3] - origin;
-        break;
-      case 3:  // at an edge
-        direction = aim.p[0] + (aim.p[1] - aim.p[0]) * uniform(random) - origin;
-        break;
-      case 4:  // in the plane of a triangle
-        origin = aim.p[0] + (aim.p[1] - aim.p[0]) * 3.0f;
-        direction = aim.p[2] + (aim.p[1] - aim.p[2]) * uniform(random) - origin;
-        break;
-      case 5:  // from far away
-        origin = direction * 1e4f;
-        direction = aim.p[0] * uniform(random) - origin;
-        break;
-      case 6:  // one component zero
-        direction = aim.p[0] - origin, direction[static_cast<int>(random() % 3)] = random() % 2 ? 0.0f : -0.0f;
-        break;
-      case 7:  // huge
-        direction *= 1e30f;
-        break;
-      case 8:  // denormal components
-        direction = aim.p[0] - origin, direction[static_cast<int>(random() % 3)] = 1e-41f;
-        break;
-      case 9:  // from a vertex
-        origin = aim.p[0];
-        break;
-    }
-    rays.push_back(make_ray(origin, direction, kRayInfinity, random() % 4 == 0));
-    rays.back().alpha_seed = static_cast<uint32_t>(random());
-  }
-  return rays;
-}
 
 void expect_same(const Ray& expected, const Ray& found, size_t index) {
   ASSERT_EQ(expected.hit.valid(), found.hit.valid()) << "ray " << index;
@@ -73,6 +27,9 @@ size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t mo
   for (const AlignedPage& page : scene.pages) EXPECT_TRUE(check_treelet(page.bytes()).ok());
   const std::vector<Ray> single = trace_together(tree, scene, rays, RayGrouping::kSingle);
   const std::vector<Ray> packets = trace_together(tree, scene, rays, RayGrouping::kPackets);
+  std::vector<std::vector<Ray>> others;
+  TraceCounters counters;
+  for (const TraversalWay& way : kTraversalWays) others.push_back(trace_by(way, tree, scene, rays, counters));
   size_t hits = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
     Ray expected = rays[i], scalar = rays[i], found = rays[i];
@@ -83,11 +40,13 @@ size_t compare(const TestScene& scene, const std::vector<Ray>& rays, uint32_t mo
     expect_same(expected, found, i);
     expect_same(expected, single[i], i);
     expect_same(expected, packets[i], i);
+    for (const std::vector<Ray>& other : others) expect_same(expected, other[i], i);
     // Which occluder an any-hit ray finds depends on the order of its boxes, which are only conservative.
     if (!expected.any_hit()) {
       EXPECT_EQ(std::memcmp(&scalar, &found, sizeof(Ray)), 0) << "ray " << i;
       EXPECT_EQ(std::memcmp(&scalar, &single[i], sizeof(Ray)), 0) << "ray " << i;
       EXPECT_EQ(std::memcmp(&scalar, &packets[i], sizeof(Ray)), 0) << "ray " << i;
+      for (const std::vector<Ray>& other : others) EXPECT_EQ(std::memcmp(&scalar, &other[i], sizeof(Ray)), 0) << "ray " << i;
     }
     if (::testing::Test::HasFatalFailure()) return hits;
     hits += expected.hit.valid();
