@@ -2,8 +2,11 @@
 // the names, as raw bytes, in its help and errors.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -27,6 +30,28 @@ std::string choice_names(const std::map<std::string, T>& choices) {
   std::string names;
   for (const auto& [value, name] : by_value) names += (names.empty() ? "" : ", ") + name;
   return names;
+}
+
+/// Choices that a description lists, as add_choice() puts them first, or behind its last colon ("which goes first: a, b, c"):
+/// two words or more with ", " between them. Empty where it lists none.
+inline std::vector<std::string> listed_choices(std::string_view description) {
+  const auto list = [](std::string_view text) {
+    std::vector<std::string> words;
+    for (size_t at = 0; at <= text.size();) {
+      const size_t end = std::min(text.find(", ", at), text.size());
+      words.emplace_back(text.substr(at, end - at));
+      const bool is_name = words.back().find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string::npos;
+      if (!is_name || words.back().empty()) return std::vector<std::string>{};
+      at = end + 2;
+    }
+    return words.size() > 1 ? words : std::vector<std::string>{};
+  };
+  const std::string_view head = description.substr(0, std::min(description.find(": "), description.find(" (")));
+  if (const auto first = list(head); !first.empty()) return first;
+  const size_t colon = description.rfind(": ");
+  if (colon == std::string_view::npos) return {};
+  const std::string_view tail = description.substr(colon + 2);
+  return list(tail.substr(0, tail.find(" (")));
 }
 
 /// `value` must outlive the parse; it keeps what it holds when the option is not given.

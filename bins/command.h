@@ -22,6 +22,7 @@ void declare_info(CLI::App& app, Console& console, Command& command);
 void declare_verify(CLI::App& app, Console& console, Command& command);
 void declare_diff(CLI::App& app, Console& console, Command& command);
 void declare_generate(CLI::App& app, Console& console, Command& command);
+void declare_help(CLI::App& app, Console& console, Command& command);
 
 /// `behind_dashes`: the words behind --, which CLI11 would take for positional ones.
 void declare_batch(CLI::App& app, Console& console, Command& command, const std::vector<std::string>& behind_dashes);

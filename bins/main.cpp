@@ -59,6 +59,7 @@ int run(int argc, char** argv) {
   shoal::declare_verify(app, console, command);
   shoal::declare_diff(app, console, command);
   shoal::declare_generate(app, console, command);
+  shoal::declare_help(app, console, command);
   bool quiet = false;
   for (CLI::App* subcommand : app.get_subcommands([](CLI::App*) { return true; })) {
     declare_console(*subcommand, console, quiet);

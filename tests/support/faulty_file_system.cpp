@@ -151,4 +151,9 @@ Status FaultyFileSystem::rename(const std::string& from, const std::string& to) 
   return base_.rename(from, to);
 }
 
+Status FaultyFileSystem::create_folder(const std::string& path) {
+  if (const Fault fault = next(Call::kCreate); fault != Fault::kNone) return failure(fault, path);
+  return base_.create_folder(path);
+}
+
 }  // namespace shoal

@@ -13,7 +13,7 @@ namespace shoal {
 enum class Fault {
   kNone,
   kIoError,    ///< any call: fails with EIO; a write leaves half of its bytes behind
-  kDiskFull,   ///< create, write, sync, rename: fails with ENOSPC; a write leaves half of its bytes behind
+  kDiskFull,   ///< create (a folder too), write, sync, rename: fails with ENOSPC; a write leaves half of its bytes behind
   kShortRead,  ///< read: fills half and fails
   kBitFlip,    ///< read: one bit of what comes back is wrong, and nobody says so
 };
@@ -36,6 +36,7 @@ class FaultyFileSystem final : public FileSystem {
   Result<uint64_t> release(const std::string& path, uint64_t offset, uint64_t bytes) override;
   Status rename(const std::string& from, const std::string& to) override;
   Status remove(const std::string& path) override { return base_.remove(path); }
+  Status create_folder(const std::string& path) override;
 
  private:
   class Reader;
