@@ -28,7 +28,7 @@ install(CODE "
   file(INSTALL \"${pages}/_shoal\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}/zsh/\${folder}\")"
   COMPONENT program)
 
-# ---- the library: one shared object that shows what include/shoal declares and nothing else (docs/decisions/0040), so that
+# ---- the library: one shared object that shows what include/shoal declares and nothing else (docs/decisions/0030), so that
 # programs that link it need none of the libraries that we stand on. While the version is 0.x each minor one breaks.
 add_library(shoal_library SHARED $<TARGET_OBJECTS:shoal_api>)
 target_link_libraries(shoal_library PRIVATE shoal_engine)
@@ -49,6 +49,7 @@ configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/shoalConfig.cmake.in ${p
 write_basic_package_version_file(${pages}/shoalConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${pages}/shoalConfig.cmake ${pages}/shoalConfigVersion.cmake DESTINATION ${config_folder}
   COMPONENT development)
+file(RELATIVE_PATH SHOAL_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(${CMAKE_SOURCE_DIR}/cmake/shoal.pc.in ${pages}/shoal.pc @ONLY)
 install(FILES ${pages}/shoal.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libshoal-dev
