@@ -122,6 +122,12 @@ int run_compare(const Arguments& arguments, Console& console) {
   for (const OrderChoice& choice : choices) orders.push_back(choice.order);
   auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1 ? 1 : 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
+  std::optional<KindOptions> kinds_asked;
+  if (arguments.kinds.asked()) {
+    kinds_asked = parse_kinds(arguments.kinds, arguments.runs).value();
+    const Status fits = check_kinds(prepared.value(), choices, *kinds_asked);
+    if (!fits.ok()) return console.error(fits.error());
+  }
   const auto compared = render_orders(arguments, prepared.value(), console);
   if (!compared.ok()) return console.error(compared.error());
   const Comparison& comparison = compared.value();
@@ -130,9 +136,8 @@ int run_compare(const Arguments& arguments, Console& console) {
     columns.push_back({order.label, &order.median()});
   }
   std::optional<KindTable> kinds;
-  if (arguments.kinds.asked()) {
-    const KindOptions options = parse_kinds(arguments.kinds, arguments.runs).value();
-    auto table = compare_kinds(prepared.value(), choices, options, console);
+  if (kinds_asked) {
+    auto table = compare_kinds(prepared.value(), choices, *kinds_asked, console);
     if (!table.ok()) return console.error(table.error());
     kinds = std::move(table).value();
   }

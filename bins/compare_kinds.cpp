@@ -13,6 +13,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+std::vector<ExecutionOptions> executions_of(const PreparedRender& prepared, const std::vector<OrderChoice>& orders) {
+  std::vector<ExecutionOptions> executions(orders.size(), prepared.execution);
+  for (size_t i = 0; i < orders.size(); ++i) orders[i].apply(executions[i]);
+  return executions;
+}
+
 std::string_view name_of(RayBirth birth) { return kRayBirthNames[static_cast<size_t>(birth)]; }
 
 double a_ray(uint64_t count, const KindFigures& figures) {
@@ -70,8 +76,9 @@ void KindArguments::declare(CLI::App& app) {
 Result<KindOptions> parse_kinds(const KindArguments& arguments, uint32_t runs) {
   KindOptions options;
   options.runs = runs;
-  SHOAL_ASSIGN_OR_RETURN(options.rays, parse_size(arguments.rays));
-  if (options.rays == 0) return Error{ErrorCode::kUsage, "--kind-rays 0: expected at least 1"};
+  const auto rays = parse_size(arguments.rays);
+  if (!rays.ok()) return Error{ErrorCode::kUsage, "--kind-rays: " + rays.error().message};
+  options.rays = rays.value();
   for (const std::string& name : arguments.kinds) {
     if (name == "all") {
       options.births.clear();
@@ -91,6 +98,10 @@ bool KindTable::identical() const {
   return std::all_of(rows.begin(), rows.end(), [](const KindRow& row) { return row.identical; });
 }
 
+Status check_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders, const KindOptions& options) {
+  return check_kinds_fit(posix_file_system(), prepared.scene, prepared.picture, executions_of(prepared, orders), options);
+}
+
 Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders,
                                 const KindOptions& options, Console& console) {
   const double start = now_seconds();
@@ -98,19 +109,15 @@ Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vecto
   hooks.stop = stop_on_signals();
   console.info(fmt::format("taking rays of each kind: at most {} of each bounce", options.rays));
   KindTable table;
+  for (const OrderChoice& order : orders) table.labels.push_back(order.label);
   SHOAL_ASSIGN_OR_RETURN(table.taken, take_kinds(posix_file_system(), prepared.scene, prepared.picture,
                                                  prepared.execution, options, hooks));
-  std::vector<ExecutionOptions> executions(orders.size(), prepared.execution);
-  for (size_t i = 0; i < orders.size(); ++i) {
-    orders[i].apply(executions[i]);
-    table.labels.push_back(orders[i].label);
-  }
   const auto done = [&](size_t rows, size_t of) {
     console.show_progress("kinds of rays", static_cast<double>(rows) / static_cast<double>(of), now_seconds() - start,
                           fmt::format("{} of {} lists", rows, of));
   };
-  auto rows = trace_kinds(posix_file_system(), prepared.scene, table.taken, prepared.picture.shading, executions,
-                          options.runs, done, hooks);
+  auto rows = trace_kinds(posix_file_system(), prepared.scene, table.taken, prepared.picture.shading,
+                          executions_of(prepared, orders), options.runs, done, hooks);
   console.end_progress();
   if (!rows.ok()) return std::move(rows).error();
   table.rows = std::move(rows).value();

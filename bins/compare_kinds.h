@@ -33,6 +33,9 @@ struct KindTable {
   bool identical() const;
 };
 
+/// Whether the cap has room for that, before anything is rendered. Fails with: kMemoryCap.
+Status check_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders, const KindOptions& options);
+
 /// Takes the rays and traces them in each of the orders, with progress. Fails with: what take_kinds() and trace_kinds()
 /// fail with.
 Result<KindTable> compare_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders,

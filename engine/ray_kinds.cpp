@@ -42,6 +42,30 @@ struct TracedKind {
   std::vector<RayHit> hits;
 };
 
+/// How rays are taken: under what is left of the cap beside them.
+struct TakingPlan {
+  PictureOptions part;
+  ExecutionOptions execution;
+  uint64_t list_bytes = 0;  ///< at most
+};
+
+TakingPlan plan_taking(const PictureOptions& picture, const ExecutionOptions& asked, const KindOptions& options) {
+  TakingPlan plan{{}, asked, 0};
+  ExecutionOptions& execution = plan.execution;
+  if (execution.max_memory_bytes == 0) execution.max_memory_bytes = default_cap_bytes();
+  if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
+  execution.order = Order::kAuto;
+  execution.preview = {};
+  execution.time_limit_seconds = 0;
+  const uint64_t bounces = picture.shading.bounces;
+  const uint64_t fitting = execution.max_memory_bytes / kCapShare / RayRecorder::bytes(1, bounces);
+  const uint64_t paths = std::max<uint64_t>(std::min(options.rays, fitting), kTilePixels);
+  plan.part = part_for_kinds(picture, paths);
+  plan.list_bytes = RayRecorder::bytes(paths, bounces);
+  execution.max_memory_bytes -= std::min(execution.max_memory_bytes - 1, plan.list_bytes);
+  return plan;
+}
+
 /// One run of one order, cold and warm.
 Result<KindRun> trace_run(FileSystem& fs, const Scene& scene, TracedKind& traced, const TraceOptions& options,
                           const RenderHooks& hooks, bool& identical) {
@@ -77,27 +101,34 @@ PictureOptions part_for_kinds(const PictureOptions& picture, uint64_t rays) {
   return part;
 }
 
+Status check_kinds_fit(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
+                       std::span<const ExecutionOptions> orders, const KindOptions& options) {
+  if (orders.empty()) return {};
+  const TakingPlan taking = plan_taking(picture, orders[0], options);
+  SHOAL_ASSIGN_OR_RETURN(const std::unique_ptr<ShadingTables> tables,
+                         ShadingTables::create(fs, scene, picture.shading, taking.execution.threads));
+  if (const auto plan = plan_memory(scene, *tables, taking.part, taking.execution); !plan.ok()) return plan.error();
+  for (const ExecutionOptions& execution : orders) {
+    TraceOptions tracing;
+    tracing.execution = execution;
+    tracing.kept_bytes = taking.list_bytes;
+    if (const auto tracer = RayTracer::create(fs, scene, tracing); !tracer.ok()) return tracer.error();
+  }
+  return {};
+}
+
 Result<TakenKinds> take_kinds(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
                               const ExecutionOptions& asked, const KindOptions& options, const RenderHooks& hooks) {
-  ExecutionOptions execution = asked;
-  if (execution.max_memory_bytes == 0) execution.max_memory_bytes = default_cap_bytes();
-  if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
-  execution.order = Order::kAuto;
-  execution.preview = {};
-  execution.time_limit_seconds = 0;
-  const uint64_t bounces = picture.shading.bounces;
-  const uint64_t fitting = execution.max_memory_bytes / kCapShare / std::max<uint64_t>(RayRecorder::bytes(1, bounces), 1);
-  const uint64_t paths = std::max<uint64_t>(std::min(options.rays, fitting), kTilePixels);
-  const PictureOptions part = part_for_kinds(picture, paths);
+  const TakingPlan plan = plan_taking(picture, asked, options);
   TakenKinds taken;
-  taken.samples = part.samples, taken.tile_sample = part.tile_sample;
-  RayRecorder recorder(part.width, execution.threads);
+  taken.samples = plan.part.samples, taken.tile_sample = plan.part.tile_sample;
+  RayRecorder recorder(plan.part.width, plan.execution.threads);
   RenderHooks heard = hooks;
   heard.recorder = &recorder;
-  execution.max_memory_bytes -= std::min(execution.max_memory_bytes - 1, RayRecorder::bytes(paths, bounces));
-  SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, part, execution, heard));
+  SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, plan.part, plan.execution, heard));
   taken.paths_count = result.counters.samples_committed_count;
   taken.kinds = recorder.take();
+  give_back_freed_memory();  // blocks of a few rays each
   if (!options.births.empty()) {
     std::erase_if(taken.kinds, [&](const RecordedKind& kind) {
       return std::find(options.births.begin(), options.births.end(), kind.birth) == options.births.end();
@@ -128,7 +159,7 @@ Result<std::vector<KindRow>> trace_kinds(FileSystem& fs, const Scene& scene, con
         options.triangle_test = shading.triangle_test;
         options.largest_list = kind.rays.size();
         // What the process holds is either told, without the lists, or measured, with them.
-        if (orders[i].process_bytes > 0) options.kept_bytes = kept_bytes;
+        options.kept_bytes = orders[i].process_bytes > 0 ? kept_bytes : kind.rays.size() * sizeof(RayHit);
         SHOAL_ASSIGN_OR_RETURN(KindRun traced_run, trace_run(fs, scene, traced, options, hooks, row.identical));
         row.orders[i].runs.push_back(std::move(traced_run));
       }

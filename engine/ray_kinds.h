@@ -34,6 +34,11 @@ struct TakenKinds {
 /// What part of `picture` is taken for so many camera rays. Its other options are those that change no ray.
 PictureOptions part_for_kinds(const PictureOptions& picture, uint64_t rays);
 
+/// Whether the cap leaves room for taking the rays and for tracing them in each order: to be asked before long work.
+/// Fails with: kMemoryCap (the message names the smallest that would), kInput (environment), kCorrupt.
+Status check_kinds_fit(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
+                       std::span<const ExecutionOptions> orders, const KindOptions& options);
+
 /// Renders that part. Under a small cap fewer rays are taken: the lists get an eighth of it at most.
 /// Fails with: what render() fails with.
 Result<TakenKinds> take_kinds(FileSystem& fs, const Scene& scene, const PictureOptions& picture,

@@ -226,6 +226,23 @@ TEST_F(RayKinds, HaveTheSameHitsInEveryOrderAndThoseOfTheRender) {
   EXPECT_EQ(hits, counters.total().ray_hits_count);
 }
 
+TEST_F(RayKinds, AreRefusedBeforehandWhereTheCapHasNoRoomForThem) {
+  execution_.order = Order::kQueued;
+  execution_.process_bytes = 50ull << 20;
+  execution_.max_memory_bytes = 200ull << 20;
+  EXPECT_TRUE(check_kinds_fit(fs_, built_->scene, picture_, {&execution_, 1}, {}).ok());
+  // Just enough to render, not for the lists.
+  uint64_t least = 50ull << 20;
+  for (;; least += 1u << 20) {
+    execution_.max_memory_bytes = least;
+    if (render(fs_, built_->scene, picture_, execution_).ok()) break;
+  }
+  execution_.max_memory_bytes += 1u << 19;
+  const Status refused = check_kinds_fit(fs_, built_->scene, picture_, {&execution_, 1}, {});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kMemoryCap);
+}
+
 TEST_F(RayKinds, TakeNoMoreThanTheirShareOfASmallCap) {
   picture_.shading.bounces = 400;
   execution_.max_memory_bytes = 512ull << 20;
