@@ -161,7 +161,8 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("compare", "the same picture in several orders, and what each moved");
   arguments->render.declare(*sub);
-  sub->add_option("--orders", arguments->orders, "comma-separated, queued also with its policy (queued:full): " + choice_names(order_choices()))
+  sub->add_option("--orders", arguments->orders,
+                  "comma-separated, queued also with its policy (queued:full): " + choice_names(order_choices()))
       ->delimiter(',')
       ->capture_default_str();
   sub->add_option("--out", arguments->out, "folder for compare.json")->required();

@@ -21,8 +21,7 @@ Result<OrderChoice> parse_one(const std::string& name) {
   }
   const auto policies = drain_policy_names();
   if (std::find(policies.begin(), policies.end(), choice.policy) == policies.end()) {
-    return Error{ErrorCode::kUsage,
-                 fmt::format("'{}': expected a policy of {}", name, fmt::join(policies, ", "))};
+    return Error{ErrorCode::kUsage, fmt::format("'{}': expected a policy of {}", name, fmt::join(policies, ", "))};
   }
   return choice;
 }

@@ -1,4 +1,5 @@
-// An order as `--orders` of `shoal compare` names it: "queued", or with its drain policy "queued:full". Called by bins.
+// An order as `--orders` of `shoal compare` names it: "queued", or with its drain policy "queued:full". Called by
+// bins.
 #pragma once
 
 #include <string>
@@ -10,7 +11,7 @@
 namespace shoal {
 
 struct OrderChoice {
-  std::string label;   ///< as it was named
+  std::string label;  ///< as it was named
   Order order;
   std::string policy;  ///< empty: that of --policy
 
@@ -20,7 +21,8 @@ struct OrderChoice {
   }
 };
 
-/// Each once. Fails with: kUsage (an unknown order or policy, a policy of an order that has no queues, a name twice).
+/// Each once. Fails with: kUsage (an unknown order or policy, a policy of an order that has no queues, a name
+/// twice).
 Result<std::vector<OrderChoice>> parse_order_choices(const std::vector<std::string>& names);
 
 }  // namespace shoal

@@ -3,8 +3,8 @@
 #include <chrono>
 #include <thread>
 
-#include "engine/streamed_paths.h"
 #include "engine/render_worker.h"
+#include "engine/streamed_paths.h"
 
 namespace shoal {
 namespace {
@@ -55,8 +55,8 @@ class PathStream final : public RayStream {
   }
 
  private:
-  /// The next rays of what came home, and of new paths; false when there are none: for now, or, with none under way,
-  /// for good.
+  /// The next rays of what came home, and of new paths; false when there are none: for now, or, with none under
+  /// way, for good.
   bool make_rays() {
     paths_.ready.clear();
     paths_.next_ready = 0;
@@ -145,7 +145,8 @@ class PathStream final : public RayStream {
 }  // namespace
 
 void render_streamed(RenderContext& context, Order order, const MakeTraversal& make) {
-  run_on_threads(context, [&](unsigned thread) { std::make_unique<PathStream>(context, thread, order, make)->run(); });
+  run_on_threads(context,
+                 [&](unsigned thread) { std::make_unique<PathStream>(context, thread, order, make)->run(); });
 }
 
 }  // namespace shoal

@@ -1,7 +1,8 @@
 // The path loop of the orders that trace each ray from its start to its end, everything in memory: hybrid, packet,
-// packet-reorder and stream (engine/render_*.cpp) differ in the traversal alone. A thread has some thousand paths under
-// way; of those that are home it makes the next rays all at once, so that rays of a kind follow each other. Where the
-// cache cannot hold every page another order renders (engine/choose_order, engine/memory_plan). One traversal a thread.
+// packet-reorder and stream (engine/render_*.cpp) differ in the traversal alone. A thread has some thousand paths
+// under way; of those that are home it makes the next rays all at once, so that rays of a kind follow each other.
+// Where the cache cannot hold every page another order renders (engine/choose_order, engine/memory_plan). One
+// traversal a thread.
 #pragma once
 
 #include <functional>

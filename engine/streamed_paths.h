@@ -1,6 +1,6 @@
-// The paths that one thread has under way in an order whose rays come from a stream and go from start to end (hybrid,
-// packet, packet-reorder, stream: engine/path_stream): their states and rays, and the pages that it has met, which it
-// keeps. One a thread.
+// The paths that one thread has under way in an order whose rays come from a stream and go from start to end
+// (hybrid, packet, packet-reorder, stream: engine/path_stream): their states and rays, and the pages that it has
+// met, which it keeps. One a thread.
 //
 // Properties and assumptions
 //   capacity   so many paths as are asked for, each with two rays at most.
@@ -19,7 +19,8 @@
 namespace shoal {
 
 struct StreamedPaths {
-  /// So many that camera rays, and the rays of one bounce after them, fill packets; few enough for the core's cache.
+  /// So many that camera rays, and the rays of one bounce after them, fill packets; few enough for the core's
+  /// cache.
   static constexpr uint32_t kPaths = 1024;
   /// Order::kStream: so many that a stream fills from those that are home while none is under way.
   static constexpr uint32_t kStreamPaths = 2048;
@@ -40,14 +41,14 @@ struct StreamedPaths {
                       traversal_bytes(order));
   }
 
-  uint32_t capacity;                  ///< paths
+  uint32_t capacity;  ///< paths
   HugeArray<PathState> states;
-  HugeArray<Ray> rays;                ///< of path p: 2p the ray that goes on, 2p + 1 the shadow ray
-  std::vector<uint32_t> free;         ///< paths
-  std::vector<uint32_t> ready;        ///< rays to be traced, from `next_ready` on
-  std::vector<uint32_t> home;         ///< rays whose answer is known
+  HugeArray<Ray> rays;          ///< of path p: 2p the ray that goes on, 2p + 1 the shadow ray
+  std::vector<uint32_t> free;   ///< paths
+  std::vector<uint32_t> ready;  ///< rays to be traced, from `next_ready` on
+  std::vector<uint32_t> home;   ///< rays whose answer is known
   size_t next_ready = 0;
-  std::vector<PagePin> pins;          ///< by treelet
+  std::vector<PagePin> pins;  ///< by treelet
   std::vector<const std::byte*> pages;
 
  private:

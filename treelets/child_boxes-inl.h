@@ -1,5 +1,5 @@
-// The boxes of a node's children as floats, of the top tree or of a treelet, for traversals that test many rays against
-// them. Included once a target (foreach_target.h).
+// The boxes of a node's children as floats, of the top tree or of a treelet, for traversals that test many rays
+// against them. Included once a target (foreach_target.h).
 #if defined(SHOAL_TREELETS_CHILD_BOXES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SHOAL_TREELETS_CHILD_BOXES_INL_H
 #undef SHOAL_TREELETS_CHILD_BOXES_INL_H

@@ -1,6 +1,6 @@
-// The rays of a packet as treelets/packet_walk-inl.h tests them: rows of 16, a lane each, on every instruction set; frames
-// of rows, one for each time that rays were put together anew; and where the walk stands. Plain arrays. One PacketWalkState
-// a thread.
+// The rays of a packet as treelets/packet_walk-inl.h tests them: rows of 16, a lane each, on every instruction set;
+// frames of rows, one for each time that rays were put together anew; and where the walk stands. Plain arrays. One
+// PacketWalkState a thread.
 #pragma once
 
 #include "treelets/ray_space.h"
@@ -17,14 +17,15 @@ inline constexpr uint32_t kMaxScopes = kMaxFrames + 1;
 
 struct alignas(64) PacketRow {
   float slope[3][kRowRays], near_bias[3][kRowRays], far_bias[3][kRowRays];  ///< RaySpace
-  float t[kRowRays];        ///< Ray::t, or what it was when the ray last was in this frame
-  uint16_t ray[kRowRays];   ///< its number in the packet
-  uint16_t outer[kRowRays]; ///< where it is in the frame around this one: row << 4 | lane
-  uint32_t alive;           ///< lanes with more to find, a bit each
-  uint32_t box_tests;       ///< that this row took part in
+  float t[kRowRays];         ///< Ray::t, or what it was when the ray last was in this frame
+  uint16_t ray[kRowRays];    ///< its number in the packet
+  uint16_t outer[kRowRays];  ///< where it is in the frame around this one: row << 4 | lane
+  uint32_t alive;            ///< lanes with more to find, a bit each
+  uint32_t box_tests;        ///< that this row took part in
 };
 
-/// Between what the rays of a frame lie along an axis. Origins as node tests move them, towards the box and away from it.
+/// Between what the rays of a frame lie along an axis. Origins as node tests move them, towards the box and away
+/// from it.
 struct AxisInterval {
   float near_origin[2], far_origin[2], slope[2];
   bool mixed;     ///< directions of both signs: nothing can be said
@@ -60,7 +61,7 @@ struct PacketWalkState {
   Ray* rays[kMostPacketRays];
   RayWork work[kMostPacketRays];
   uint32_t box_tests[kMostPacketRays];
-  bool gone[kMostPacketRays];  ///< the answer is known
+  bool gone[kMostPacketRays];       ///< the answer is known
   RaySpace space[kMostPacketRays];  ///< of the object that the ray is in
   PacketRow rows[kMaxRows];
   uint32_t row_count;

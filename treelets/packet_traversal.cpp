@@ -14,7 +14,8 @@ PacketTraversal::PacketTraversal(const TopTree& tree, PageTable pages, TriangleT
       packet_rays_(packet_rays),
       walk_(walk),
       state_(std::make_unique<PacketWalkState>()) {
-  SHOAL_CHECK(packet_rays >= kLeastPacketRays && packet_rays <= kMostPacketRays && std::has_single_bit(packet_rays));
+  SHOAL_CHECK(packet_rays >= kLeastPacketRays && packet_rays <= kMostPacketRays &&
+              std::has_single_bit(packet_rays));
 }
 
 void PacketTraversal::trace(RayStream& stream, TraceCounters& counters) {

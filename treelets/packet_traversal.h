@@ -6,8 +6,8 @@
 
 namespace shoal {
 
-using WalkPackets = void (*)(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays, RayStream& stream,
-                             TraceCounters& counters);
+using WalkPackets = void (*)(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays,
+                             RayStream& stream, TraceCounters& counters);
 
 class PacketTraversal final : public SceneTraversal {
  public:

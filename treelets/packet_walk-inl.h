@@ -1,11 +1,12 @@
-// A packet's way through a scene in memory: one stack for all its rays, through the tree over instances, an object's tree
-// and its treelets. What packets do with rays that do not take part is the Policy's; this is what they share. Included
-// once a target by trace_packets.cpp and trace_packets_reorder.cpp (foreach_target.h).
+// A packet's way through a scene in memory: one stack for all its rays, through the tree over instances, an
+// object's tree and its treelets. What packets do with rays that do not take part is the Policy's; this is what
+// they share. Included once a target by trace_packets.cpp and trace_packets_reorder.cpp (foreach_target.h).
 //
 // A box is tested when its turn comes, row by row; those of children are bounded first by interval arithmetic, and
 // wait in the order in which the first ray that is known to be in the node meets them.
 //
-// Policy::kFirstRowSuffices: an inner node is entered as soon as a row has a ray that enters it; the rows after it are
+// Policy::kFirstRowSuffices: an inner node is entered as soon as a row has a ray that enters it; the rows after it
+// are
 //   taken along untested (Wald, Boulos & Shirley 2007, 4.1). Else it is known of every ray.
 // Policy::reorders(rays, rows): whether so many rays in so many rows are put together anew.
 #if defined(SHOAL_TREELETS_PACKET_WALK_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -98,7 +99,8 @@ class PacketWalk {
   HWY_INLINE PacketScope& scope() { return s_.scopes[s_.scope_count - 1]; }
   HWY_INLINE Row& row(const Frame& frame, uint32_t r) { return s_.rows[frame.first_row + r]; }
 
-  // -- frames ---------------------------------------------------------------------------------------------------------
+  // -- frames
+  // ---------------------------------------------------------------------------------------------------------
 
   HWY_INLINE Frame& open_frame() {
     Frame& frame = s_.frames[s_.frame_count++];
@@ -147,7 +149,8 @@ class PacketWalk {
       return false;
     }
     Row& last = row(frame, frame.row_count - 1);
-    for (uint32_t lane = (frame.ray_count - 1) % kRowRays + 1; lane < kRowRays; ++lane) copy_lane(last, 0, last, lane);
+    for (uint32_t lane = (frame.ray_count - 1) % kRowRays + 1; lane < kRowRays; ++lane)
+      copy_lane(last, 0, last, lane);
     frame.live = (1u << frame.row_count) - 1;
     bound_rays(frame, &row(frame, 0));
     return true;
@@ -221,7 +224,8 @@ class PacketWalk {
     if (at.alive == 0) frame.live &= ~(1u << r);
   }
 
-  // -- boxes ----------------------------------------------------------------------------------------------------------
+  // -- boxes
+  // ----------------------------------------------------------------------------------------------------------
 
   HWY_INLINE bool is_inner(uint32_t ref) {
     return scope().in_treelet ? !is_leaf(ref) : kind_of(ref) == ChildKind::kNode;
@@ -233,7 +237,8 @@ class PacketWalk {
     const bool inner = is_inner(box.ref);
     uint32_t rows = find_rows(frame, box, Policy::kFirstRowSuffices && inner);
     if (rows == 0) return;
-    if (inner && !Policy::kFirstRowSuffices && (rows & (rows - 1)) != 0 && Policy::reorders(ray_count(rows), std::popcount(rows))) {
+    if (inner && !Policy::kFirstRowSuffices && (rows & (rows - 1)) != 0 &&
+        Policy::reorders(ray_count(rows), std::popcount(rows))) {
       reorder(rows);
       rows = scope().frame->live;
     }
@@ -243,7 +248,8 @@ class PacketWalk {
 
   HWY_INLINE uint32_t ray_count(uint32_t rows) const {
     uint32_t count = 0;
-    for (; rows != 0; rows &= rows - 1) count += static_cast<uint32_t>(std::popcount(masks_[std::countr_zero(rows)]));
+    for (; rows != 0; rows &= rows - 1)
+      count += static_cast<uint32_t>(std::popcount(masks_[std::countr_zero(rows)]));
     return count;
   }
 
@@ -264,7 +270,8 @@ class PacketWalk {
     return found;
   }
 
-  /// Children that rays may enter go to the stack, the first to be met on top. Requires: the mask of the first of `rows`.
+  /// Children that rays may enter go to the stack, the first to be met on top. Requires: the mask of the first of
+  /// `rows`.
   HWY_INLINE void push_children(const ChildBoxes& boxes, uint32_t rows) {
     const Frame& frame = *scope().frame;
     const auto first = static_cast<uint32_t>(std::countr_zero(rows));
@@ -281,13 +288,16 @@ class PacketWalk {
     for (uint32_t i = 0; i < size; ++i) {
       const uint32_t slot = keys[i] & 7;
       WaitingBox& box = s_.stack[s_.size++];
-      for (uint32_t axis = 0; axis < 3; ++axis) box.lo[axis] = boxes.lo[axis][slot], box.hi[axis] = boxes.hi[axis][slot];
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        box.lo[axis] = boxes.lo[axis][slot], box.hi[axis] = boxes.hi[axis][slot];
       box.ref = boxes.refs[slot];
       box.rows = rows;
     }
   }
 
-  HWY_INLINE void cross_top(uint32_t index, uint32_t rows) { push_children(ChildBoxes(tables_.nodes[index]), rows); }
+  HWY_INLINE void cross_top(uint32_t index, uint32_t rows) {
+    push_children(ChildBoxes(tables_.nodes[index]), rows);
+  }
   HWY_INLINE void cross_node(NodeRef ref, uint32_t rows) { push_children(ChildBoxes(scope().nodes[ref]), rows); }
 
   /// What is on top of the stack comes next.
@@ -305,16 +315,21 @@ class PacketWalk {
     for (int line = 0; line < 3; ++line) hwy::Prefetch(at + 64 * line);
   }
 
-  // -- what a box holds -----------------------------------------------------------------------------------------------
+  // -- what a box holds
+  // -----------------------------------------------------------------------------------------------
 
   HWY_INLINE void visit(uint32_t ref, uint32_t rows) {
     if (scope().in_treelet) return is_leaf(ref) ? cross_leaf(ref, rows) : cross_node(ref, rows);
     const uint32_t child = ref & kIndexMask;
     switch (kind_of(ref)) {
-      case ChildKind::kNode: return cross_top(child, rows);
-      case ChildKind::kEntry: return enter_treelet(tables_.entries[child], rows);
-      case ChildKind::kInstance: return enter_instance(child, rows);
-      case ChildKind::kEmpty: return;
+      case ChildKind::kNode:
+        return cross_top(child, rows);
+      case ChildKind::kEntry:
+        return enter_treelet(tables_.entries[child], rows);
+      case ChildKind::kInstance:
+        return enter_instance(child, rows);
+      case ChildKind::kEmpty:
+        return;
     }
   }
 
@@ -325,7 +340,8 @@ class PacketWalk {
                 [&](uint32_t, Row&, uint32_t, uint32_t ray) HWY_ATTR { ++s_.work[ray].treelets; });
     const TreeletView treelet(page);
     PacketFrame* frame = scope().frame;
-    s_.scopes[s_.scope_count++] = {frame, s_.size, true, entry, page, page + treelet.header->leaves_offset, treelet.nodes};
+    s_.scopes[s_.scope_count++] = {frame,        s_.size, true, entry, page, page + treelet.header->leaves_offset,
+                                   treelet.nodes};
     visit(entry.root, rows);
   }
 

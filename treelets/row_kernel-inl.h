@@ -19,8 +19,8 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using R16 = hn::CappedTag<float, kRowRays>;
 
-/// Lanes of the row whose rays enter the box at or before their end: the test of cross_boxes() (box_kernel-inl.h), each
-/// ray by the signs of its own direction.
+/// Lanes of the row whose rays enter the box at or before their end: the test of cross_boxes() (box_kernel-inl.h),
+/// each ray by the signs of its own direction.
 HWY_INLINE uint32_t enter_box(const PacketRow& row, const WaitingBox& box) {
   const R16 f;
   uint32_t entered = 0;
@@ -29,7 +29,8 @@ HWY_INLINE uint32_t enter_box(const PacketRow& row, const WaitingBox& box) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const auto slope = hn::Load(f, row.slope[axis] + first);
       const auto lo = hn::Set(f, box.lo[axis]), hi = hn::Set(f, box.hi[axis]);
-      const auto negative = hn::Lt(slope, hn::Zero(f));  // never zero; IfNegativeThenElse of Highway 1.0.3 errs on SSSE3
+      const auto negative =
+          hn::Lt(slope, hn::Zero(f));  // never zero; IfNegativeThenElse of Highway 1.0.3 errs on SSSE3
       near[axis] = hn::MulAdd(hn::IfThenElse(negative, hi, lo), slope, hn::Load(f, row.near_bias[axis] + first));
       far[axis] = hn::MulAdd(hn::IfThenElse(negative, lo, hi), slope, hn::Load(f, row.far_bias[axis] + first));
     }
@@ -42,13 +43,13 @@ HWY_INLINE uint32_t enter_box(const PacketRow& row, const WaitingBox& box) {
   return entered;
 }
 
-/// Interval arithmetic (Wald, Boulos & Shirley 2007, "Ray Tracing Deformable Scenes", 4.2; for slabs Boulos et al. 2006):
-/// t of a plane is (plane - origin) * slope, so that over all rays it lies between the least and the greatest of the four
-/// products of bounds. Returns the children, a bit each, that some ray of the frame may enter.
+/// Interval arithmetic (Wald, Boulos & Shirley 2007, "Ray Tracing Deformable Scenes", 4.2; for slabs Boulos et al.
+/// 2006): t of a plane is (plane - origin) * slope, so that over all rays it lies between the least and the
+/// greatest of the four products of bounds. Returns the children, a bit each, that some ray of the frame may enter.
 ///
-/// What enters a triangle's own box is accepted. In positions and units of u (ray_space.h): of |o| 3 for the moved origin,
-/// which is got back as bias / slope, and 2 for the difference and the product, of B these 2 and 2 for the plane, the
-/// enlargement 1; with the 4 and 3 of the triangle's box 10 and 8, and kNodePad is 12.
+/// What enters a triangle's own box is accepted. In positions and units of u (ray_space.h): of |o| 3 for the moved
+/// origin, which is got back as bias / slope, and 2 for the difference and the product, of B these 2 and 2 for the
+/// plane, the enlargement 1; with the 4 and 3 of the triangle's box 10 and 8, and kNodePad is 12.
 HWY_INLINE uint32_t may_enter(const PacketFrame& frame, const ChildBoxes& boxes) {
   const F8 f;
   uint32_t entered = 0;
@@ -75,8 +76,8 @@ HWY_INLINE uint32_t may_enter(const PacketFrame& frame, const ChildBoxes& boxes)
   return entered;
 }
 
-/// Where the ray in a lane meets the boxes of the children, whether it enters them or not: the order in which the packet
-/// visits them. Writes 8.
+/// Where the ray in a lane meets the boxes of the children, whether it enters them or not: the order in which the
+/// packet visits them. Writes 8.
 HWY_INLINE void near_of(const PacketRow& row, uint32_t lane, const ChildBoxes& boxes, float* near) {
   const F8 f;
   for (size_t first = 0; first < 8; first += hn::Lanes(f)) {
@@ -84,7 +85,8 @@ HWY_INLINE void near_of(const PacketRow& row, uint32_t lane, const ChildBoxes& b
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const float slope = row.slope[axis][lane];
       const float* plane = (std::signbit(slope) ? boxes.hi : boxes.lo)[axis] + first;
-      t_near = hn::Max(t_near, hn::MulAdd(hn::Load(f, plane), hn::Set(f, slope), hn::Set(f, row.near_bias[axis][lane])));
+      t_near =
+          hn::Max(t_near, hn::MulAdd(hn::Load(f, plane), hn::Set(f, slope), hn::Set(f, row.near_bias[axis][lane])));
     }
     hn::StoreU(t_near, f, near + first);
   }
@@ -111,7 +113,7 @@ HWY_INLINE void bound_rays(PacketFrame& frame, const PacketRow* rows) {
     at.negative = std::signbit(at.slope[0]);
     at.mixed = at.negative != std::signbit(at.slope[1]);
     if (at.mixed) continue;
-    const auto origin = [&](const float (*bias)[kRowRays], const PacketRow& row, size_t i) HWY_ATTR {
+    const auto origin = [&](const float(*bias)[kRowRays], const PacketRow& row, size_t i) HWY_ATTR {
       return hn::Neg(hn::Div(hn::Load(f, bias[axis] + i), hn::Load(f, row.slope[axis] + i)));
     };
     bounds([&](const PacketRow& row, size_t i) HWY_ATTR { return origin(row.near_bias, row, i); }, at.near_origin);

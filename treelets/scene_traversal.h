@@ -1,9 +1,10 @@
-// Other ways than SceneTracer's (treelets/trace_scene.h) of tracing the rays of a stream through a scene in memory, to
-// compare: each in its file, all to the same bits. Of every kind of ray, triangle test, position and coverage, under
-// instances and in motion. Called by engine/render_packet, render_packet_reorder, render_stream.
+// Other ways than SceneTracer's (treelets/trace_scene.h) of tracing the rays of a stream through a scene in memory,
+// to compare: each in its file, all to the same bits. Of every kind of ray, triangle test, position and coverage,
+// under instances and in motion. Called by engine/render_packet, render_packet_reorder, render_stream.
 //
-//   packet          treelets/trace_packets: N rays, one stack; a node is entered when the first ray that may enters it
-//   packet-reorder  treelets/trace_packets_reorder: every ray is known to enter or not; where fewer than half of the
+//   packet          treelets/trace_packets: N rays, one stack; a node is entered when the first ray that may enters
+//   it packet-reorder  treelets/trace_packets_reorder: every ray is known to enter or not; where fewer than half of
+//   the
 //                   lanes have a ray that does, those are copied together and go on by themselves
 //   stream          treelets/trace_stream: a list of rays for each node
 //
@@ -23,8 +24,9 @@ namespace shoal {
 class SceneTraversal {
  public:
   virtual ~SceneTraversal() = default;
-  /// Until the stream has no ray left and none is under way. Counts lanes (TraceCounters::simd_lanes_count): those that
-  /// tests of boxes and triangles had, and of those the ones in which a ray entered the box or met a leaf's triangle.
+  /// Until the stream has no ray left and none is under way. Counts lanes (TraceCounters::simd_lanes_count): those
+  /// that tests of boxes and triangles had, and of those the ones in which a ray entered the box or met a leaf's
+  /// triangle.
   virtual void trace(RayStream& stream, TraceCounters& counters) = 0;
 };
 

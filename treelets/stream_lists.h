@@ -1,10 +1,11 @@
-// The state of treelets/trace_stream: the rays of a stream, prepared, and the lists of those that are in a node (Wald,
-// Gribble, Boulos & Kensler 2007, "SIMD Ray Stream Tracing"; by a ray against all children of a wide node as Tsakok 2009,
-// "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"). Plain arrays, about 2 MiB. One StreamState a thread.
+// The state of treelets/trace_stream: the rays of a stream, prepared, and the lists of those that are in a node
+// (Wald, Gribble, Boulos & Kensler 2007, "SIMD Ray Stream Tracing"; by a ray against all children of a wide node as
+// Tsakok 2009, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing"). Plain arrays, about 2 MiB. One StreamState
+// a thread.
 //
-// Lists lie in one array as on a stack: that of the node to be visited next is the last, and makes room for those of its
-// children. Seven rays in eight may wait at each level, so the array would have to be huge in the worst case; instead a
-// list whose children might not have room is halved, and the halves go one after the other.
+// Lists lie in one array as on a stack: that of the node to be visited next is the last, and makes room for those
+// of its children. Seven rays in eight may wait at each level, so the array would have to be huge in the worst
+// case; instead a list whose children might not have room is halved, and the halves go one after the other.
 #pragma once
 
 #include "treelets/ray_space.h"
@@ -43,16 +44,16 @@ struct StreamScope {
 struct StreamState {
   Ray* rays[kStreamRays];
   RayWork work[kStreamRays];
-  bool gone[kStreamRays];         ///< the answer is known
+  bool gone[kStreamRays];  ///< the answer is known
   RaySpace world[kStreamRays], object[kStreamRays];
   uint32_t current[kStreamRays];  ///< rays in the node that is visited
   uint32_t count;                 ///< of them
   StreamItem children[8][kStreamRays];
   StreamItem items[kStreamItems];
-  uint32_t used;                  ///< of them
+  uint32_t used;  ///< of them
   StreamList stack[kSceneStack + kMostHalvings];
   uint32_t size;
-  StreamScope scopes[3];          ///< the world, an object, a treelet
+  StreamScope scopes[3];  ///< the world, an object, a treelet
   uint32_t scope_count;
 };
 

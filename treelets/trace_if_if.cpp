@@ -43,7 +43,9 @@ class IfIf : private Tracer<kTest> {
 void if_if_watertight(std::span<TraceJob> jobs, TraceCounters& counters) {
   IfIf<TriangleTest::kWatertight>(jobs, counters).run();
 }
-void if_if_fast(std::span<TraceJob> jobs, TraceCounters& counters) { IfIf<TriangleTest::kFast>(jobs, counters).run(); }
+void if_if_fast(std::span<TraceJob> jobs, TraceCounters& counters) {
+  IfIf<TriangleTest::kFast>(jobs, counters).run();
+}
 void if_if_double(std::span<TraceJob> jobs, TraceCounters& counters) {
   IfIf<TriangleTest::kDouble>(jobs, counters).run();
 }
@@ -61,9 +63,12 @@ HWY_EXPORT(if_if_double);
 
 void trace_if_if(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test) {
   switch (test) {
-    case TriangleTest::kFast: return HWY_DYNAMIC_DISPATCH(if_if_fast)(jobs, counters);
-    case TriangleTest::kDouble: return HWY_DYNAMIC_DISPATCH(if_if_double)(jobs, counters);
-    case TriangleTest::kWatertight: return HWY_DYNAMIC_DISPATCH(if_if_watertight)(jobs, counters);
+    case TriangleTest::kFast:
+      return HWY_DYNAMIC_DISPATCH(if_if_fast)(jobs, counters);
+    case TriangleTest::kDouble:
+      return HWY_DYNAMIC_DISPATCH(if_if_double)(jobs, counters);
+    case TriangleTest::kWatertight:
+      return HWY_DYNAMIC_DISPATCH(if_if_watertight)(jobs, counters);
   }
 }
 

@@ -19,15 +19,15 @@ struct PlainPackets {
 };
 
 void packets_watertight(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays, RayStream& stream,
-                   TraceCounters& counters) {
+                        TraceCounters& counters) {
   PacketWalk<TriangleTest::kWatertight, PlainPackets>(tables, state, stream, counters).run(packet_rays);
 }
 void packets_fast(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays, RayStream& stream,
-             TraceCounters& counters) {
+                  TraceCounters& counters) {
   PacketWalk<TriangleTest::kFast, PlainPackets>(tables, state, stream, counters).run(packet_rays);
 }
 void packets_double(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays, RayStream& stream,
-               TraceCounters& counters) {
+                    TraceCounters& counters) {
   PacketWalk<TriangleTest::kDouble, PlainPackets>(tables, state, stream, counters).run(packet_rays);
 }
 
@@ -42,12 +42,15 @@ HWY_EXPORT(packets_watertight);
 HWY_EXPORT(packets_fast);
 HWY_EXPORT(packets_double);
 
-std::unique_ptr<SceneTraversal> make_packet_traversal(const TopTree& tree, PageTable pages, TriangleTest test, uint32_t packet_rays) {
+std::unique_ptr<SceneTraversal> make_packet_traversal(const TopTree& tree, PageTable pages, TriangleTest test,
+                                                      uint32_t packet_rays) {
   const auto walk = [](const SceneTables& tables, PacketWalkState& state, uint32_t rays, RayStream& stream,
                        TraceCounters& counters) {
     switch (tables.test) {
-      case TriangleTest::kFast: return HWY_DYNAMIC_DISPATCH(packets_fast)(tables, state, rays, stream, counters);
-      case TriangleTest::kDouble: return HWY_DYNAMIC_DISPATCH(packets_double)(tables, state, rays, stream, counters);
+      case TriangleTest::kFast:
+        return HWY_DYNAMIC_DISPATCH(packets_fast)(tables, state, rays, stream, counters);
+      case TriangleTest::kDouble:
+        return HWY_DYNAMIC_DISPATCH(packets_double)(tables, state, rays, stream, counters);
       case TriangleTest::kWatertight:
         return HWY_DYNAMIC_DISPATCH(packets_watertight)(tables, state, rays, stream, counters);
     }

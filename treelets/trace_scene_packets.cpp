@@ -320,6 +320,7 @@ bool has_packets() { return true; }
 void trace_packets(const SceneTables& tables, PacketState& state, uint64_t most, RayStream& stream,
                    TraceCounters& counters, PacketUse& use) {
   PacketRun(tables, state, stream, counters, use).run(most);
+  counters.simd_lanes_count += kLeafLanes * use.node_visits, counters.simd_active_lanes_count += use.ray_visits;
 }
 
 #else

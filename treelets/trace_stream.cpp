@@ -85,8 +85,8 @@ class StreamWalk {
     s_.work[ray].treelets += work.treelets;
   }
 
-  /// The list on top of the stack becomes the current one, without rays that end before they would get there. False: it
-  /// was empty, or so long that its children might not have room, and is now two.
+  /// The list on top of the stack becomes the current one, without rays that end before they would get there.
+  /// False: it was empty, or so long that its children might not have room, and is now two.
   HWY_INLINE bool take_list() {
     StreamList& list = s_.stack[s_.size - 1];
     if (HWY_UNLIKELY(list.count > 1 && list.first + 8 * list.count > kStreamItems - kStreamReserve)) {
@@ -106,8 +106,8 @@ class StreamWalk {
     return s_.count > 0;
   }
 
-  /// Tests the rays of the current list against a node's children: a list for each that any enters, the one that they
-  /// enter first on average on top.
+  /// Tests the rays of the current list against a node's children: a list for each that any enters, the one that
+  /// they enter first on average on top.
   HWY_INLINE void cross(const ChildBoxes& boxes) {
     const F8 f;
     const U8 u;
@@ -176,10 +176,14 @@ class StreamWalk {
     if (scope().in_treelet) return is_leaf(ref) ? cross_leaf(ref) : cross(ChildBoxes(scope().nodes[ref]));
     const uint32_t child = ref & kIndexMask;
     switch (kind_of(ref)) {
-      case ChildKind::kNode: return cross(ChildBoxes(tables_.nodes[child]));
-      case ChildKind::kEntry: return enter_treelet(tables_.entries[child]);
-      case ChildKind::kInstance: return enter_instance(child);
-      case ChildKind::kEmpty: return;
+      case ChildKind::kNode:
+        return cross(ChildBoxes(tables_.nodes[child]));
+      case ChildKind::kEntry:
+        return enter_treelet(tables_.entries[child]);
+      case ChildKind::kInstance:
+        return enter_instance(child);
+      case ChildKind::kEmpty:
+        return;
     }
   }
 
@@ -189,7 +193,8 @@ class StreamWalk {
     for (uint32_t i = 0; i < s_.count; ++i) ++s_.work[s_.current[i]].treelets;
     const TreeletView treelet(page);
     const RaySpace* spaces = scope().spaces;
-    s_.scopes[s_.scope_count++] = {s_.size, true, spaces, entry, page, page + treelet.header->leaves_offset, treelet.nodes};
+    s_.scopes[s_.scope_count++] = {s_.size,      true, spaces, entry, page, page + treelet.header->leaves_offset,
+                                   treelet.nodes};
     visit(entry.root);
   }
 
@@ -270,9 +275,12 @@ class StreamTraversal final : public SceneTraversal {
     const SceneTables tables = scene_tables(tree_, pages_, test_);
     if (tree_.nodes().empty() || exceeds_stacks(tree_)) return trace_all_slowly(tables, stream, counters);
     switch (test_) {
-      case TriangleTest::kFast: return HWY_DYNAMIC_DISPATCH(stream_fast)(tables, *state_, stream, counters);
-      case TriangleTest::kDouble: return HWY_DYNAMIC_DISPATCH(stream_double)(tables, *state_, stream, counters);
-      case TriangleTest::kWatertight: return HWY_DYNAMIC_DISPATCH(stream_watertight)(tables, *state_, stream, counters);
+      case TriangleTest::kFast:
+        return HWY_DYNAMIC_DISPATCH(stream_fast)(tables, *state_, stream, counters);
+      case TriangleTest::kDouble:
+        return HWY_DYNAMIC_DISPATCH(stream_double)(tables, *state_, stream, counters);
+      case TriangleTest::kWatertight:
+        return HWY_DYNAMIC_DISPATCH(stream_watertight)(tables, *state_, stream, counters);
     }
   }
 

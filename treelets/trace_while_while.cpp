@@ -43,7 +43,9 @@ class WhileWhile : private Tracer<kTest> {
 void while_while_watertight(std::span<TraceJob> jobs, TraceCounters& counters) {
   WhileWhile<TriangleTest::kWatertight>(jobs, counters).run();
 }
-void while_while_fast(std::span<TraceJob> jobs, TraceCounters& counters) { WhileWhile<TriangleTest::kFast>(jobs, counters).run(); }
+void while_while_fast(std::span<TraceJob> jobs, TraceCounters& counters) {
+  WhileWhile<TriangleTest::kFast>(jobs, counters).run();
+}
 void while_while_double(std::span<TraceJob> jobs, TraceCounters& counters) {
   WhileWhile<TriangleTest::kDouble>(jobs, counters).run();
 }
@@ -61,9 +63,12 @@ HWY_EXPORT(while_while_double);
 
 void trace_while_while(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test) {
   switch (test) {
-    case TriangleTest::kFast: return HWY_DYNAMIC_DISPATCH(while_while_fast)(jobs, counters);
-    case TriangleTest::kDouble: return HWY_DYNAMIC_DISPATCH(while_while_double)(jobs, counters);
-    case TriangleTest::kWatertight: return HWY_DYNAMIC_DISPATCH(while_while_watertight)(jobs, counters);
+    case TriangleTest::kFast:
+      return HWY_DYNAMIC_DISPATCH(while_while_fast)(jobs, counters);
+    case TriangleTest::kDouble:
+      return HWY_DYNAMIC_DISPATCH(while_while_double)(jobs, counters);
+    case TriangleTest::kWatertight:
+      return HWY_DYNAMIC_DISPATCH(while_while_watertight)(jobs, counters);
   }
 }
 

@@ -146,6 +146,13 @@ TEST(Usage, WhatDoesNotFitTheSceneExitsTwo) {
   expect_error(run_shoal(folder, {"compare", folder / "terrain.shoal", "--orders", "queued,zigzag", "--out",
                                   folder / "c", "--width", "8", "--height", "8", "--spp", "1"}),
                2, {"unknown order 'zigzag'", "auto, queued, depth-first, sorted"});
+  const auto expect_orders = [&](const std::string& orders, const std::vector<std::string>& parts) {
+    expect_error(run_shoal(folder, {"compare", folder / "terrain.shoal", "--orders", orders, "--out", folder / "c"}), 2, parts);
+  };
+  expect_orders("queued:laziest", {"'queued:laziest'", "resident-first, fullest, sweep, full"});
+  expect_orders("packet:full", {"'packet:full'", "only the queued order"});
+  expect_orders("packet,queued,packet", {"'packet' twice"});
+  expect({"--packet-size", "48"}, {"--packet-size", "48"});
   EXPECT_THAT(folder.names(), ::testing::ElementsAre("terrain", "terrain.shoal"));
 }
 

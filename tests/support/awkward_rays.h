@@ -6,7 +6,8 @@
 namespace shoal::testing {
 
 /// Rays of every awkward sort at a scene about [-1, 1]^3 in size.
-inline std::vector<Ray> awkward_rays(std::mt19937& random, const std::vector<TestTriangle>& triangles, size_t count) {
+inline std::vector<Ray> awkward_rays(std::mt19937& random, const std::vector<TestTriangle>& triangles,
+                                     size_t count) {
   std::vector<Ray> rays;
   std::uniform_real_distribution<float> uniform(0, 1);
   while (rays.size() < count) {

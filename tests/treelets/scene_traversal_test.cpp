@@ -1,5 +1,6 @@
-// Packets, packets that are put together anew, and streams (treelets/scene_traversal.h), and the inner loops in lock-step:
-// whatever the rays, the answers of single rays, which trace_brute_force_test compares with testing every triangle.
+// Packets, packets that are put together anew, and streams (treelets/scene_traversal.h), and the inner loops in
+// lock-step: whatever the rays, the answers of single rays, which trace_brute_force_test compares with testing
+// every triangle.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -29,7 +30,8 @@ std::vector<Ray> one_by_one(const Fixture& f, std::vector<Ray> rays) {
 std::vector<Ray> camera_rays(size_t count, bool any_hit = false) {
   std::vector<Ray> rays;
   for (size_t i = 0; i < count; ++i) {
-    const float u = 0.3f + 0.0004f * static_cast<float>(i % 256), v = 0.2f + 0.0004f * static_cast<float>(i / 256 % 256);
+    const float u = 0.3f + 0.0004f * static_cast<float>(i % 256),
+                v = 0.2f + 0.0004f * static_cast<float>(i / 256 % 256);
     rays.push_back(make_ray({-3, -3.1f, 4}, {u + 3, v + 3.1f, -4}, any_hit ? 1.0f : kRayInfinity, any_hit));
   }
   return rays;
@@ -134,7 +136,8 @@ TEST(SceneTraversal, LosesNoRayWhateverTheStreamSays) {
         RayListStream stream(found, f.scene, most_out, hesitates);
         TraceCounters counters;
         const auto traversal = way.make(f.tree, stream.table.data(), TriangleTest::kWatertight);
-        for (int call = 0; call < 20000 && stream.done_count < rays.size(); ++call) traversal->trace(stream, counters);
+        for (int call = 0; call < 20000 && stream.done_count < rays.size(); ++call)
+          traversal->trace(stream, counters);
         ASSERT_EQ(stream.done_count, rays.size()) << way.name;
         expect_same_ends("", way.name, expected, found);
       }
@@ -195,7 +198,8 @@ TEST(SceneTraversal, LanesTellRaysThatAgreeFromRaysThatDoNot) {
   }
   const size_t packets = 1, reordered = 3, streams = 4;
   EXPECT_GT(lane_share(alike[packets]), 2 * lane_share(scattered[packets]));
-  EXPECT_GT(lane_share(scattered[reordered]), 1.2 * lane_share(scattered[packets])) << "what putting them together is for";
+  EXPECT_GT(lane_share(scattered[reordered]), 1.2 * lane_share(scattered[packets]))
+      << "what putting them together is for";
   EXPECT_NEAR(lane_share(alike[streams]), lane_share(scattered[streams]), 0.15) << "lanes are boxes, not rays";
 }
 
@@ -213,7 +217,8 @@ TEST(InnerLoops, FindTheHitsOfTheMoreNumerousAndLeaveLanesIdle) {
       std::vector<TraceJob> jobs;
       for (size_t i = 0; i < found.size(); ++i) {
         found[i].instance = 0;
-        jobs.push_back({f.scene.pages[0].bytes().data(), &found[i], &contexts[i], &f.scene.instances[0], f.scene.entries[0]});
+        jobs.push_back(
+            {f.scene.pages[0].bytes().data(), &found[i], &contexts[i], &f.scene.instances[0], f.scene.entries[0]});
       }
       TraceCounters counters;
       trace_treelets(jobs, counters, test, loop);
