@@ -5,8 +5,7 @@
 // A box is tested when its turn comes, row by row; those of children are bounded first by interval arithmetic, and
 // wait in the order in which the first ray that is known to be in the node meets them.
 //
-// Policy::kFirstRowSuffices: an inner node is entered as soon as a row has a ray that enters it; the rows after it
-// are
+// Policy::kFirstRowSuffices: an inner node is entered as soon as a row has a ray that enters it; rows after it are
 //   taken along untested (Wald, Boulos & Shirley 2007, 4.1). Else it is known of every ray.
 // Policy::reorders(rays, rows): whether so many rays in so many rows are put together anew.
 #if defined(SHOAL_TREELETS_PACKET_WALK_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -21,7 +20,7 @@
 
 #include "treelets/hit_kernel-inl.h"
 #include "treelets/leaf_kernel-inl.h"
-#include "treelets/row_kernel-inl.h"
+#include "treelets/packet_frames-inl.h"
 #include "treelets/space_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -29,10 +28,10 @@ namespace shoal {
 namespace HWY_NAMESPACE {
 
 template <TriangleTest kTest, class Policy>
-class PacketWalk {
+class PacketWalk : private PacketFrames {
  public:
   PacketWalk(const SceneTables& tables, PacketWalkState& state, RayStream& stream, TraceCounters& counters)
-      : tables_(tables), s_(state), stream_(stream), counters_(counters) {}
+      : PacketFrames(state), tables_(tables), stream_(stream), counters_(counters) {}
 
   /// Packets of `size` rays until the stream has no more and none wait.
   HWY_INLINE void run(uint32_t size) {
@@ -48,9 +47,6 @@ class PacketWalk {
   }
 
  private:
-  using Frame = PacketFrame;
-  using Row = PacketRow;
-
   /// A full packet of rays that ask the same, or what there is when the stream has no more.
   HWY_INLINE uint32_t take(uint32_t size) {
     uint32_t kind = 0;
@@ -97,33 +93,6 @@ class PacketWalk {
   }
 
   HWY_INLINE PacketScope& scope() { return s_.scopes[s_.scope_count - 1]; }
-  HWY_INLINE Row& row(const Frame& frame, uint32_t r) { return s_.rows[frame.first_row + r]; }
-
-  // -- frames
-  // ---------------------------------------------------------------------------------------------------------
-
-  HWY_INLINE Frame& open_frame() {
-    Frame& frame = s_.frames[s_.frame_count++];
-    frame.first_row = s_.row_count;
-    frame.row_count = frame.ray_count = frame.live = 0;
-    return frame;
-  }
-
-  /// The next lane of the frame.
-  HWY_INLINE uint32_t add_lane(Frame& frame, uint32_t ray, uint32_t outer) {
-    const uint32_t lane = frame.ray_count++ % kRowRays;
-    if (lane == 0) {
-      Row& fresh = s_.rows[s_.row_count++];
-      fresh.alive = fresh.box_tests = 0;
-      ++frame.row_count;
-    }
-    Row& at = row(frame, frame.row_count - 1);
-    at.ray[lane] = static_cast<uint16_t>(ray), at.outer[lane] = static_cast<uint16_t>(outer);
-    at.alive |= 1u << lane;
-    at.t[lane] = s_.rays[ray]->t;
-    return lane;
-  }
-
   /// One that the kernels cannot take goes to its end at once.
   HWY_INLINE void add_ray(Frame& frame, uint32_t ray, const RaySpace& space, uint32_t outer) {
     if (HWY_UNLIKELY(space.extreme)) return trace_alone(ray);
@@ -140,46 +109,6 @@ class PacketWalk {
     s_.gone[ray] = true;
     s_.work[ray].node_tests += work.node_tests, s_.work[ray].triangle_tests += work.triangle_tests;
     s_.work[ray].treelets += work.treelets;
-  }
-
-  /// False: it has no ray, and is gone.
-  HWY_INLINE bool close_frame(Frame& frame) {
-    if (frame.ray_count == 0) {
-      --s_.frame_count;
-      return false;
-    }
-    Row& last = row(frame, frame.row_count - 1);
-    for (uint32_t lane = (frame.ray_count - 1) % kRowRays + 1; lane < kRowRays; ++lane)
-      copy_lane(last, 0, last, lane);
-    frame.live = (1u << frame.row_count) - 1;
-    bound_rays(frame, &row(frame, 0));
-    return true;
-  }
-
-  static HWY_INLINE void copy_lane(const Row& from, uint32_t from_lane, Row& to, uint32_t to_lane) {
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      to.slope[axis][to_lane] = from.slope[axis][from_lane];
-      to.near_bias[axis][to_lane] = from.near_bias[axis][from_lane];
-      to.far_bias[axis][to_lane] = from.far_bias[axis][from_lane];
-    }
-    to.t[to_lane] = from.t[from_lane];
-  }
-
-  /// `visit(row number, row, lane, ray)` for each lane in the masks of `rows`.
-  template <class Visit>
-  HWY_INLINE void each_masked(const Frame& frame, uint32_t rows, const Visit& visit) {
-    for (; rows != 0; rows &= rows - 1) {
-      const auto r = static_cast<uint32_t>(std::countr_zero(rows));
-      Row& at = row(frame, r);
-      for (uint32_t lanes = masks_[r]; lanes != 0; lanes &= lanes - 1) {
-        const auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
-        visit(r, at, lane, at.ray[lane]);
-      }
-    }
-  }
-
-  HWY_INLINE void mask_all(const Frame& frame) {
-    for (uint32_t r = 0; r < frame.row_count; ++r) masks_[r] = row(frame, r).alive;
   }
 
   /// The rays of the masks in rows of their own, until what is above the stack as it is has been visited.
@@ -212,21 +141,6 @@ class PacketWalk {
     --s_.frame_count;
   }
 
-  HWY_INLINE void update(Frame& frame, uint32_t place, uint32_t ray) {
-    Row& at = row(frame, place >> 4);
-    at.t[place & 15] = s_.rays[ray]->t;
-    if (s_.gone[ray]) remove(frame, place >> 4, place & 15);
-  }
-
-  HWY_INLINE void remove(Frame& frame, uint32_t r, uint32_t lane) {
-    Row& at = row(frame, r);
-    at.alive &= ~(1u << lane);
-    if (at.alive == 0) frame.live &= ~(1u << r);
-  }
-
-  // -- boxes
-  // ----------------------------------------------------------------------------------------------------------
-
   HWY_INLINE bool is_inner(uint32_t ref) {
     return scope().in_treelet ? !is_leaf(ref) : kind_of(ref) == ChildKind::kNode;
   }
@@ -244,13 +158,6 @@ class PacketWalk {
     }
     visit(box.ref, rows);
     prefetch_next();
-  }
-
-  HWY_INLINE uint32_t ray_count(uint32_t rows) const {
-    uint32_t count = 0;
-    for (; rows != 0; rows &= rows - 1)
-      count += static_cast<uint32_t>(std::popcount(masks_[std::countr_zero(rows)]));
-    return count;
   }
 
   /// Rows of which rays enter the box, and sets their masks. `first_only`: once there is one, it and all after it.
@@ -314,9 +221,6 @@ class PacketWalk {
     }
     for (int line = 0; line < 3; ++line) hwy::Prefetch(at + 64 * line);
   }
-
-  // -- what a box holds
-  // -----------------------------------------------------------------------------------------------
 
   HWY_INLINE void visit(uint32_t ref, uint32_t rows) {
     if (scope().in_treelet) return is_leaf(ref) ? cross_leaf(ref, rows) : cross_node(ref, rows);
@@ -392,10 +296,8 @@ class PacketWalk {
   }
 
   const SceneTables& tables_;
-  PacketWalkState& s_;
   RayStream& stream_;
   TraceCounters& counters_;
-  uint32_t masks_[kMostPacketRays / kRowRays];  ///< of the rows that the last test found: lanes that enter
 };
 
 }  // namespace HWY_NAMESPACE
