@@ -10,8 +10,8 @@ namespace {
 
 /// Chosen by the batch, or of no use in one.
 const std::set<std::string>& kept_back() {
-  static const std::set<std::string> kNames{"help",      "output",     "png",     "preview",      "stats",
-                                            "cache-dir", "max-memory", "threads", "discard-built"};
+  static const std::set<std::string> kNames{"help",       "output",  "png",           "preview", "stats",       "cache-dir",
+                                            "max-memory", "threads", "discard-built", "resume",  "sample-range"};
   return kNames;
 }
 

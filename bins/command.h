@@ -16,6 +16,7 @@ using Command = std::function<int()>;
 
 void declare_build(CLI::App& app, Console& console, Command& command);
 void declare_render(CLI::App& app, Console& console, Command& command);
+void declare_merge(CLI::App& app, Console& console, Command& command);
 void declare_compare(CLI::App& app, Console& console, Command& command);
 void declare_accuracy(CLI::App& app, Console& console, Command& command);
 void declare_info(CLI::App& app, Console& console, Command& command);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "bins/checkpoint_options.h"
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
@@ -15,6 +16,7 @@ namespace {
 
 struct Arguments {
   RenderArguments render;
+  CheckpointArguments checkpoint;
   std::string output, png, preview, stats, tonemap = "pbr-neutral", target_noise;
   std::vector<std::string> aovs;
   float exposure = 0;
@@ -46,6 +48,10 @@ Status check_arguments(const Arguments& arguments) {
                  "--time-limit with --sampler blue-noise: its points depend on the number of samples, which is not known "
                  "beforehand; take sobol"};
   }
+  SHOAL_RETURN_IF_ERROR(check_checkpoint_arguments(arguments.checkpoint));
+  if (!arguments.checkpoint.range.empty() && !(arguments.png.empty() && arguments.preview.empty())) {
+    return Error{ErrorCode::kUsage, "--sample-range with --png or --preview: a part is no picture yet; `shoal merge` has --png"};
+  }
   for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
   }
@@ -70,9 +76,11 @@ Status write_pngs(const Arguments& arguments, const ExrImage& image) {
 }
 
 Status write_outputs(const Arguments& arguments, const PreparedRender& prepared, const RenderResult& result) {
-  const ExrImage image = picture_image(result, prepared.scene, prepared.picture);
-  SHOAL_RETURN_IF_ERROR(write_exr(posix_file_system(), arguments.output, image));
-  SHOAL_RETURN_IF_ERROR(write_pngs(arguments, image));
+  if (prepared.execution.sums_path.empty()) {
+    const ExrImage image = picture_image(result, prepared.scene, prepared.picture);
+    SHOAL_RETURN_IF_ERROR(write_exr(posix_file_system(), arguments.output, image));
+    SHOAL_RETURN_IF_ERROR(write_pngs(arguments, image));
+  }
   if (arguments.stats.empty()) return {};
   const std::string json = stats_json(result, prepared.scene, prepared.picture, prepared.execution);
   return write_whole_file(posix_file_system(), arguments.stats, std::as_bytes(std::span(json)));
@@ -85,10 +93,15 @@ int run_render(const Arguments& arguments, Console& console) {
   asked.execution.preview = {arguments.preview, tone_of(arguments).value()};
   asked.execution.time_limit_seconds = arguments.time_limit;
   asked.picture.noise = parse_noise_target(arguments.target_noise).value();
+  asked.picture.range = parse_sample_range(arguments.checkpoint.range).value();
+  if (asked.picture.range.count() > 0) asked.execution.sums_path = arguments.output;
   if (asked.samples->count() == 0) {
     if (arguments.has_time_limit) asked.picture.samples = kMostSamples;
     if (asked.picture.noise.asked()) asked.picture.samples = kMostForNoise;
   }
+  const auto checkpoint = checkpoint_options(arguments.checkpoint, arguments.output, console);
+  if (!checkpoint.ok()) return console.error(checkpoint.error());
+  asked.execution.checkpoint = checkpoint.value();
   auto prepared = prepare_render(asked, {arguments.render.execution.order}, 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
@@ -100,12 +113,17 @@ int run_render(const Arguments& arguments, Console& console) {
   if (!result.ok()) return console.error(result.error());
   const Status written = write_outputs(arguments, p, result.value());
   if (!written.ok()) return console.error(written.error());
+  remove_checkpoint(p.execution.checkpoint);
   if (arguments.has_time_limit || p.picture.noise.asked()) console.info(describe_samples(result.value()));
   if (p.picture.noise.asked() && !(result.value().noise && result.value().noise->meets(p.picture.noise))) {
     console.warning(fmt::format("the noise asked for ({:.3g} % at the median, {:.3g} % at the 95th percentile) was not "
                                 "reached", 100 * p.picture.noise.median, 100 * p.picture.noise.percentile_95));
   }
-  console.info(fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds));
+  std::string written_in = fmt::format("{} written in {:.2f} s", arguments.output, result.value().seconds);
+  if (const auto& resumed = result.value().resumed) {
+    written_in += fmt::format(", after {:.2f} s before it was resumed: what is counted came after that", resumed->seconds);
+  }
+  console.info(written_in);
   for (const std::string& warning : number_warnings(result.value().counters, p.picture.width)) {
     console.warning(warning);
   }
@@ -121,7 +139,8 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* sub = app.add_subcommand("render", "scene to picture");
   arguments->render.declare(*sub);
-  sub->add_option("-o,--output", arguments->output, "the picture, .exr")->required();
+  sub->add_option("-o,--output", arguments->output, "the picture, .exr; with --sample-range a part")->required();
+  arguments->checkpoint.declare(*sub);
   sub->add_option("--png", arguments->png, "the picture as 8-bit sRGB PNG as well");
   sub->add_option("--preview", arguments->preview,
                   "a .png, written early from few samples, refreshed while rendering, finished at the end");

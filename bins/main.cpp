@@ -45,14 +45,15 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "shoal " SHOAL_VERSION);
   app.require_subcommand(1);
   app.footer("Exit codes: 0 done, 1 a bug of ours, 2 usage, 3 input missing or invalid, 4 a required extension is not "
-             "supported,\n5 the memory cap cannot work or memory ran out, 6 disk full or I/O error, 7 a corrupt .shoal "
-             "file, 8 (batch) some scenes failed, 9 stopped, 10 (diff) the pictures differ.");
+             "supported,\n5 the memory cap cannot work or memory ran out, 6 disk full or I/O error, 7 a corrupt .shoal, "
+             "checkpoint or part, 8 (batch) some scenes failed, 9 stopped, 10 (diff) the pictures differ.");
   shoal::Console console;
   shoal::Command command;
   shoal::declare_build(app, console, command);
   shoal::declare_render(app, console, command);
   const std::vector<std::string> behind_dashes = cut_behind_dashes(argc, argv);
   shoal::declare_batch(app, console, command, behind_dashes);
+  shoal::declare_merge(app, console, command);
   shoal::declare_compare(app, console, command);
   shoal::declare_accuracy(app, console, command);
   shoal::declare_info(app, console, command);

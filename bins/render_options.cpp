@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -24,9 +25,28 @@
 namespace shoal {
 namespace {
 
-std::atomic<bool> g_stop{false};  ///< the only global: a signal handler can reach nothing else
+// The only globals: a signal handler can reach nothing else.
+std::atomic<bool> g_stop{false};
+std::atomic<int64_t> g_stop_ns{0};  ///< when that became true
 
-void on_signal(int) { g_stop.store(true, std::memory_order_relaxed); }
+int64_t monotonic_ns() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+/// What is sent to a group of processes and again by one of them to another (a terminal and `shoal batch`) is one signal.
+constexpr int64_t kSameSignalNs = 1'000'000'000;
+
+/// The first asks to stop, a later one ends the process at once.
+void on_signal(int) {
+  const int64_t now = monotonic_ns();
+  if (!g_stop.exchange(true)) {
+    g_stop_ns = now;
+  } else if (now - g_stop_ns > kSameSignalNs) {
+    ::_exit(static_cast<int>(ErrorCode::kStopped));
+  }
+}
 
 std::filesystem::path default_cache_folder() {
   if (const char* folder = std::getenv("XDG_CACHE_HOME"); folder != nullptr && *folder == '/') {
@@ -363,7 +383,7 @@ RenderHooks console_hooks(Console& console) {
   hooks.stop = stop_on_signals();
   hooks.progress = [&console](const RenderProgress& p) {
     std::string detail = fmt::format("{:.2f} M samples/s, {} read",
-                                     static_cast<double>(p.samples_done) / p.seconds * 1e-6,
+                                     static_cast<double>(p.samples_done - p.samples_before) / p.seconds * 1e-6,
                                      format_bytes(p.disk_read_bytes));
     if (p.first_picture) detail += fmt::format(", first picture after {:.2f} s", p.first_picture->seconds);
     console.show_progress("rendering", p.fraction, p.seconds, detail, p.seconds_left);
@@ -379,6 +399,7 @@ std::string describe_plan(const MemoryPlan& plan) {
                                  format_bytes(plan.film_bytes));
   if (plan.preview_bytes > 0) text += fmt::format(", preview {}", format_bytes(plan.preview_bytes));
   if (plan.aov_bytes > 0) text += fmt::format(", AOVs {}", format_bytes(plan.aov_bytes));
+  if (plan.checkpoint_bytes > 0) text += fmt::format(", checkpoint {}", format_bytes(plan.checkpoint_bytes));
   if (plan.noise_bytes > 0) text += fmt::format(", noise {}", format_bytes(plan.noise_bytes));
   return text + fmt::format(", {} paths in flight {} and their rays {}, page cache {} of {} (geometry {}, attributes {}, "
                             "textures {}), read buffers {}, scratch {}",

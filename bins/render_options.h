@@ -72,7 +72,8 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
 /// Whether a path names a built scene.
 bool is_shoal_file(const std::string& path);
 
-/// Becomes true at SIGINT or SIGTERM, from this call on.
+/// Becomes true at SIGINT or SIGTERM, from this call on. One that comes more than a second later ends the process at once,
+/// with code 9.
 const std::atomic<bool>* stop_on_signals();
 /// Hooks that show progress and stop on SIGINT and SIGTERM.
 RenderHooks console_hooks(Console& console);

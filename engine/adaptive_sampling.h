@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/exact_variance.h"
@@ -55,6 +56,21 @@ class AdaptiveSampling {
   uint64_t drawn_pixels() const;
   /// How many samples, of all pixels together, it will take still, when no pixel gets more than `most`.
   uint64_t expected_samples(uint32_t most) const;
+
+  /// What checkpoints hold (docs/file_format.md): numbers, then parts(). Written in a pass while nobody adds.
+  struct Numbers {
+    uint64_t rendered_count = 0;
+    uint32_t samples = 0, drawn_count = 0;
+    float more_of_all[2] = {0, 0}, dark[2] = {-1, -1};
+  };
+  Numbers numbers() const;
+  std::vector<std::span<std::byte>> parts();
+  /// Of those with so many blocks drawn.
+  static uint64_t parts_bytes(uint32_t width, uint32_t height, uint32_t drawn_count);
+  /// Makes room for the parts that belong to `numbers`; false when there are none such.
+  bool take(const Numbers& numbers);
+  /// Whether what the parts were filled with can be gone on with in a pass that begins after so many samples.
+  bool plausible(uint32_t samples) const;
 
   /// The estimated standard error of every pixel's luminance in the film, and what of the target was reached. Nothing
   /// when there are too few samples to tell. Requires: end_pass() was called after the last pass.

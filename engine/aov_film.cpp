@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <mutex>
+#include <type_traits>
 
 namespace shoal {
 namespace {
@@ -63,6 +65,66 @@ uint64_t AovFilm::bytes(AovSet set, uint32_t width, uint32_t height, const PageF
   const uint64_t objects = set.has(Aov::kObjectId) ? ObjectIds::bytes(scene) : 0;
   const uint64_t pages = set.has(Aov::kBytes) ? scene.page_count() * sizeof(uint32_t) : 0;
   return pixels * (sums + channels * sizeof(float)) + kLocks * sizeof(SpinLock) + file + objects + pages;
+}
+
+std::vector<AovFilm::Plane> AovFilm::planes() {
+  std::vector<Plane> planes;
+  const auto add = [&](Aov aov, auto& sums) {
+    if (set_.has(aov)) planes.push_back({aov, std::as_writable_bytes(std::span(sums))});
+  };
+  add(Aov::kAlbedo, albedo_);
+  add(Aov::kNormal, normal_);
+  add(Aov::kDepth, depth_);
+  add(Aov::kPosition, position_);
+  add(Aov::kVariance, squares_);
+  add(Aov::kObjectId, object_ids_);
+  add(Aov::kMaterialId, material_ids_);
+  add(Aov::kTreelets, treelets_);
+  add(Aov::kBytes, bytes_);
+  return planes;
+}
+
+bool AovFilm::plausible() const {
+  const auto in_range = [](const FixedPoint128& sum) { return sum.in_range(); };
+  return std::all_of(depth_.begin(), depth_.end(), in_range) && std::all_of(position_.begin(), position_.end(), in_range);
+}
+
+uint64_t AovFilm::plane_bytes(AovSet set, uint32_t width, uint32_t height) {
+  uint64_t bytes = 0;
+  for (uint32_t i = 0; i < kAovCount; ++i) {
+    if (set.has(Aov(i))) bytes += uint64_t{width} * height * aov_info(Aov(i)).sum_bytes;
+  }
+  return bytes;
+}
+
+void AovFilm::add_plane(Aov aov, uint64_t first_byte, std::span<const std::byte> bytes) {
+  const auto each = [&]<class T>(std::vector<T>& sums, const auto& add) {
+    SHOAL_CHECK(first_byte % sizeof(T) == 0 && bytes.size() % sizeof(T) == 0);
+    T* to = sums.data() + first_byte / sizeof(T);
+    for (size_t at = 0; at < bytes.size(); at += sizeof(T), ++to) {
+      T from;
+      std::memcpy(&from, &bytes[at], sizeof(T));
+      add(*to, from);
+    }
+  };
+  // Unsigned: what a part holds may be anything, and then the sum is something.
+  const auto number = []<class T>(T& to, T from) {
+    using Bits = std::make_unsigned_t<T>;
+    to = static_cast<T>(static_cast<Bits>(to) + static_cast<Bits>(from));
+  };
+  const auto wide = [](auto& to, const auto& from) { to.add(from); };
+  switch (aov) {
+    case Aov::kAlbedo: return each(albedo_, number);
+    case Aov::kNormal: return each(normal_, number);
+    case Aov::kDepth: return each(depth_, wide);
+    case Aov::kPosition: return each(position_, wide);
+    case Aov::kVariance: return each(squares_, wide);
+    case Aov::kObjectId: return each(object_ids_, number);  // of sample 0: one part has them, the others 0
+    case Aov::kMaterialId: return each(material_ids_, number);
+    case Aov::kTreelets: return each(treelets_, number);
+    case Aov::kBytes: return each(bytes_, number);
+    case Aov::kSamples: return;
+  }
 }
 
 void AovFilm::add_first_hit(uint32_t pixel, const SurfaceFeatures& features) {

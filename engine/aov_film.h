@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "engine/aov.h"
@@ -49,6 +50,19 @@ class AovFilm {
   uint32_t take_read_ahead(PageId page) {
     return read_ahead_[page].load(std::memory_order_relaxed) == 0 ? 0 : read_ahead_[page].exchange(0);
   }
+
+  /// The sums as they are stored (docs/file_format.md), a plane an AOV that has sums, while nobody adds.
+  struct Plane {
+    Aov aov;
+    std::span<std::byte> bytes;
+  };
+  std::vector<Plane> planes();
+  /// Whether sums are in their range, whatever planes() were filled with.
+  bool plausible() const;
+  /// What planes() of such a film hold together.
+  static uint64_t plane_bytes(AovSet set, uint32_t width, uint32_t height);
+  /// Adds the sums of another film, from `first_byte` of its plane of that AOV on. Requires: whole sums.
+  void add_plane(Aov aov, uint64_t first_byte, std::span<const std::byte> bytes);
 
   /// The layers as channels of the file. `film` holds the same samples.
   std::vector<ExrChannel> resolve(const Film& film) const;

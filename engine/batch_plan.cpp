@@ -16,6 +16,9 @@ namespace {
 
 namespace stdfs = std::filesystem;
 
+/// Of renders that do not say otherwise: what a machine that fails costs at most.
+constexpr const char* kCheckpointEvery = "every=10m";
+
 std::string folder_of(const std::string& path) {
   const size_t slash = path.rfind('/');
   return slash == std::string::npos ? "" : path.substr(0, slash);
@@ -149,6 +152,8 @@ std::vector<std::string> render_command(const BatchOptions& options, const Rende
     words.insert(words.end(), {"--cache-dir", options.cache_folder.empty() ? paths.built(scene) : options.cache_folder});
   }
   if (!is_built && !options.keep_built) words.push_back("--discard-built");
+  words.push_back("--resume");
+  if (!scene.options.contains("checkpoint")) words.insert(words.end(), {"--checkpoint", kCheckpointEvery});
   if (share.memory_bytes > 0) words.insert(words.end(), {"--max-memory", std::to_string(share.memory_bytes)});
   if (share.threads > 0) words.insert(words.end(), {"--threads", std::to_string(share.threads)});
   for (std::string& word : option_words(scene.options, rules)) words.push_back(std::move(word));

@@ -55,7 +55,8 @@ struct BatchPaths {
   std::string picture(const BatchScene& s) const { return out + "/" + s.output + ".exr"; }
   std::string png(const BatchScene& s) const { return out + "/" + s.output + ".png"; }
   std::string stats(const BatchScene& s) const { return out + "/" + s.output + ".stats.json"; }
-  std::string folder(const BatchScene& s) const;  ///< of these three
+  std::string checkpoint(const BatchScene& s) const { return picture(s) + ".checkpoint"; }  ///< of `shoal render`
+  std::string folder(const BatchScene& s) const;  ///< of these four
   std::string record(const BatchScene& s) const { return state + "/records/" + s.id + ".json"; }
   std::string log(const BatchScene& s) const { return state + "/logs/" + s.id + ".log"; }
   std::string thumbnail(const BatchScene& s) const { return state + "/thumbnails/" + s.id + ".png"; }

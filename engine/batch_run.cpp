@@ -28,6 +28,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kMemoryCapExit = static_cast<int>(ErrorCode::kMemoryCap);
+constexpr int kInputExit = static_cast<int>(ErrorCode::kInput), kCorruptExit = static_cast<int>(ErrorCode::kCorrupt);
 constexpr int kStoppedExit = static_cast<int>(ErrorCode::kStopped);
 constexpr uint32_t kThumbnailSide = 160;
 /// Of this process beside what it holds when it begins: a block to hash, records and statistics being read, a row of a
@@ -95,10 +96,16 @@ SceneRecord forgotten(SceneRecord before) {
   return now;
 }
 
+bool is_file(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
 struct RunningRender {
   size_t entry = 0;
   ChildProcess process;
   BatchShare taken;  ///< of the budget
+  bool resumed = false;  ///< there was a checkpoint to go on from
   Clock::time_point start;
 };
 
@@ -151,12 +158,18 @@ class BatchRun {
     std::vector<std::string> files = {paths_.summary(), paths_.page(), paths_.asked()};
     for (const BatchEntry& entry : standing_.entries) {
       for (std::string& path : outputs_of(paths_, entry.scene)) files.push_back(std::move(path));
+      files.push_back(paths_.checkpoint(entry.scene));
       files.push_back(paths_.record(entry.scene));
       files.push_back(paths_.thumbnail(entry.scene));
     }
     remove_temporaries(files);
     remove_all_temporaries(paths_.state + "/built");
     if (!options_.keep_built) remove_folder(paths_.state + "/built");
+  }
+
+  void remove_checkpoint(const BatchScene& scene) const {
+    std::error_code ignored;
+    std::filesystem::remove(paths_.checkpoint(scene), ignored);
   }
 
   void tell_all() {
@@ -214,6 +227,7 @@ class BatchRun {
       return ended(entry);
     }
     if (look.value().content_changed) remove_folder(paths_.built(entry.scene));
+    if (!look.value().as_before || options_.force) remove_checkpoint(entry.scene);
     return start(index, share);
   }
 
@@ -227,13 +241,14 @@ class BatchRun {
     // Before the render: from here on its outputs may be replaced, and an older record must not vouch for them.
     SHOAL_RETURN_IF_ERROR(write_record(fs_, paths_.record(entry.scene), record));
     if (const Status made = fs_.create_folder(paths_.folder(entry.scene)); !made.ok()) return failed(entry, made.error());
+    const bool resumed = is_file(paths_.checkpoint(entry.scene));
     const ChildCommand command{render_command(options_, rules_, entry.scene, share), paths_.log(entry.scene), lock_};
     auto process = ChildProcess::start(command);
     if (!process.ok()) return failed(entry, process.error());
     const BatchShare taken{share.memory_bytes, std::min(left_.threads, share.threads)};
     left_.memory_bytes -= taken.memory_bytes;
     left_.threads -= taken.threads;
-    running_.push_back({index, std::move(process).value(), taken, Clock::now()});
+    running_.push_back({index, std::move(process).value(), taken, resumed, Clock::now()});
     if (hooks_.started) hooks_.started(entry);
     return {};
   }
@@ -249,6 +264,7 @@ class BatchRun {
     record.exit_code = end.signal != 0 ? 128 + end.signal : end.exit_code;
     if (record.exit_code != 0) {
       remove_temporaries(outputs_of(paths_, entry.scene));
+      remove_temporaries({paths_.checkpoint(entry.scene)});
       remove_all_temporaries(paths_.built(entry.scene));
     }
     if (!options_.keep_built) remove_folder(paths_.built(entry.scene));
@@ -262,6 +278,12 @@ class BatchRun {
     if (share_too_small) {
       alone_.push_back(render.entry);
       return {};
+    }
+    // A checkpoint that is damaged, or of a scene that was built with another share of memory: without it.
+    const bool refused = render.resumed && (record.exit_code == kInputExit || record.exit_code == kCorruptExit);
+    if (refused && !told_) {
+      remove_checkpoint(entry.scene);
+      return start(render.entry, render.taken);
     }
     return record.exit_code == 0 ? finished(entry) : failed_render(entry, end);
   }
@@ -385,8 +407,9 @@ Result<SceneLook> look_at_scene(FileSystem& fs, const BatchOptions& options, con
   record.options = option_words(scene.options, rules);
   record.key = key_of(record.content, record.options);
   if (!before) return look;
+  look.as_before = before->key == record.key && before->scene == scene.scene;
   look.content_changed = before->content.hash != record.content.hash;
-  look.done = before->state == SceneState::kDone && before->key == record.key && before->scene == scene.scene &&
+  look.done = before->state == SceneState::kDone && look.as_before &&
               before->output_bytes == output_sizes(paths, scene);
   if (!look.done) return look;
   SceneContent now = std::move(record.content);

@@ -39,6 +39,7 @@ Result<BatchResult> run_batch(FileSystem& fs, const BatchOptions& options, const
 struct SceneLook {
   bool done = false;             ///< its outputs are those of this scene, these options and this program
   bool content_changed = false;  ///< since it was rendered or tried
+  bool as_before = false;        ///< nothing changed: what a render that was stopped has done is of this picture
   SceneRecord record;            ///< what is remembered of one that is done; else its key, content and options
 };
 /// Also for --dry-run. Fails with: kStorage, kStopped.

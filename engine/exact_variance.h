@@ -15,6 +15,14 @@ struct SquareSum {
 
   /// Requires: finite, |value| <= Film::kMaxRadiance; at most 2^22 times.
   void add_square(float value);
+  void add(const SquareSum& other) {
+    unsigned __int128 sum = 0;
+    for (int i = 0; i < 3; ++i) {
+      sum += static_cast<unsigned __int128>(word[i]) + other.word[i];
+      word[i] = static_cast<uint64_t>(sum);
+      sum >>= 64;
+    }
+  }
 };
 
 /// Unbiased: the sum of squared distances from the mean over count - 1; 0 of fewer than two samples.

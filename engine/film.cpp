@@ -1,7 +1,11 @@
 #include "engine/film.h"
 
+#include <algorithm>
 #include <bit>
+#include <cstring>
 #include <mutex>
+
+#include "io/result.h"
 
 namespace shoal {
 
@@ -49,6 +53,26 @@ bool Film::add(uint32_t pixel, const Vec3& radiance, bool covered, uint32_t half
   p.covered += covered ? 1 : 0;
   ++p.added;
   return inside;
+}
+
+bool Film::plausible(uint32_t samples) const {
+  return std::all_of(pixels_.begin(), pixels_.end(), [&](const Pixel& pixel) {
+    const bool in_range = pixel.rgb[0].in_range() && pixel.rgb[1].in_range() && pixel.rgb[2].in_range();
+    return in_range && pixel.covered <= pixel.added && pixel.added <= samples;
+  });
+}
+
+void Film::add_raw(uint64_t first_byte, std::span<const std::byte> bytes) {
+  static_assert(sizeof(Pixel) == kPixelBytes);
+  SHOAL_CHECK(first_byte % sizeof(Pixel) == 0 && bytes.size() % sizeof(Pixel) == 0);
+  Pixel* to = pixels_.data() + first_byte / sizeof(Pixel);
+  for (size_t at = 0; at < bytes.size(); at += sizeof(Pixel), ++to) {
+    Pixel from;
+    std::memcpy(&from, &bytes[at], sizeof(Pixel));
+    for (int c = 0; c < 3; ++c) to->rgb[c].add(from.rgb[c]);
+    to->covered += from.covered;
+    to->added += from.added;
+  }
 }
 
 Film::Mean Film::mean_of(const Pixel& pixel) {

@@ -5,8 +5,10 @@
 // Called by engine/render_*. Threads: any number; a striped lock guards a pixel. Cost: 56 bytes a pixel and half.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "queues/spin_lock.h"
@@ -21,11 +23,14 @@ struct FixedPoint128 {
 
   void add(const FixedPoint128& other) {
     const uint64_t sum = low + other.low;
-    high += other.high + (sum < low ? 1 : 0);
+    const uint64_t carry = sum < low ? 1 : 0;
+    high = static_cast<int64_t>(static_cast<uint64_t>(high) + static_cast<uint64_t>(other.high) + carry);
     low = sum;
   }
   /// Exact for |value| in [2^-64 * 2^23, 2^62); smaller bits are cut off towards zero. Requires: finite, |value| < 2^62.
   static FixedPoint128 from_float(float value);
+  /// Whether it is in the range of sums: what is read from a file may be anything.
+  bool in_range() const { return high >= -(int64_t{1} << 62) && high < (int64_t{1} << 62); }
   double to_double() const;
 };
 
@@ -63,10 +68,18 @@ class Film {
   /// Of one half.
   uint32_t added(size_t pixel, uint32_t half) const { return pixels_[half == 0 ? pixel : second(pixel)].added; }
 
+  /// The sums as they are stored (docs/file_format.md), while nobody adds.
+  std::span<std::byte> raw() { return std::as_writable_bytes(std::span(pixels_)); }
+  /// Whether every pixel holds what so many samples can bring, whatever raw() was filled with.
+  bool plausible(uint32_t samples) const;
+  /// Adds the sums of pixels of another film from `first_byte` of its raw() on. Requires: the same halves; whole pixels.
+  void add_raw(uint64_t first_byte, std::span<const std::byte> bytes);
+
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
 
   static constexpr float kMaxRadiance = 0x1p40f;  ///< 2^22 samples of it fit the sum
+  static constexpr uint64_t kPixelBytes = 56;     ///< of a half, in raw()
 
  private:
   struct Pixel {
@@ -74,6 +87,7 @@ class Film {
     uint32_t covered = 0;
     uint32_t added = 0;  ///< samples
   };
+  static_assert(sizeof(FixedPoint128) == 16);
   static constexpr uint32_t kLocks = 4096;
   size_t second(size_t pixel) const { return size_t{width_} * height_ + pixel; }
   /// Red, green, blue and the covered share; 0 without samples.

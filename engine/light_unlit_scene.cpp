@@ -20,8 +20,12 @@ Result<std::vector<float>> probe_luminances(FileSystem& fs, const Scene& scene, 
   PictureOptions probe = picture;
   probe.width = probe.height = 16;
   probe.samples = 4;
+  probe.range = {};
   ExecutionOptions unseen = execution;
   unseen.preview = {};
+  unseen.checkpoint = {};
+  unseen.sums_path.clear();
+  unseen.time_limit_seconds = 0;  // the lamp is that of these samples
   SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, probe, unseen));
   std::vector<float> values;
   for (size_t i = 0; i < result.rgba.size(); i += 4) {

@@ -40,6 +40,8 @@ constexpr unsigned kLeastReadDepth = 4;
 /// Shading tables of any scene: directional albedo, structures.
 constexpr uint64_t kSmallTableBytes = 256 * 1024;
 constexpr uint64_t kLobeTableBytes = 1024 * 1024;  // engine/lobe_tables.h, for scenes with layers
+/// Of samples and of the texts of a checkpoint; sums are written from where they are.
+constexpr uint64_t kCheckpointBlockBytes = 2 * kMiB;
 constexpr uint64_t kFloatPixelBytes = 4 * sizeof(float);
 
 /// What is known of a scene before or after its tables are read.
@@ -85,6 +87,9 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   plan.film_bytes = Film::bytes(picture.width, picture.height, adaptive ? 2 : 1) + pixels * kFloatPixelBytes;
   if (adaptive) plan.noise_bytes = AdaptiveSampling::bytes(picture.width, picture.height);
   if (!execution.preview.path.empty()) plan.preview_bytes = Preview::bytes(picture.width, picture.height);
+  if (!execution.checkpoint.path.empty()) {
+    plan.checkpoint_bytes = kCheckpointBlockBytes + execution.checkpoint.unfinished_count * sizeof(UnfinishedSample);
+  }
   plan.aov_bytes = AovFilm::bytes(picture.aovs, picture.width, picture.height, scene.file);
   plan.read_buffer_bytes = threads * (pages.largest + 2 * kPageAlignment);  // direct reads need their own
   plan.scratch_bytes = kProcessGrowthBytes + threads * kThreadBytes +

@@ -28,6 +28,7 @@ struct MemoryPlan {
   uint64_t preview_bytes = 0;      ///< --preview: its pixels, and the file before it is written
   uint64_t aov_bytes = 0;          ///< --aov: sums, and the layers while they are written
   uint64_t noise_bytes = 0;        ///< --target-noise: sums and judgements
+  uint64_t checkpoint_bytes = 0;   ///< a block of it, and samples that begin again
   uint64_t path_state_bytes = 0;   ///< path states and the lists in which they wait
   uint64_t ray_bytes = 0;          ///< rays and their queues
   uint64_t cache_bytes = 0;        ///< pages of geometry, attributes and textures
@@ -43,7 +44,7 @@ struct MemoryPlan {
   uint64_t paths_bytes() const { return path_state_bytes + ray_bytes; }
   uint64_t total_bytes() const {
     return process_bytes + top_tree_bytes + table_bytes + film_bytes + preview_bytes + aov_bytes + noise_bytes +
-           paths_bytes() + cache_bytes + read_buffer_bytes + scratch_bytes;
+           checkpoint_bytes + paths_bytes() + cache_bytes + read_buffer_bytes + scratch_bytes;
   }
 };
 

@@ -56,10 +56,11 @@ void OrderRunner::run(RenderContext& context) {
 }
 
 void OrderRunner::choose(RenderContext& context) {
-  const FirstChoice first = choose_before_trials(execution_.order, plan_, context.samples.count());
+  const FirstChoice first =
+      choose_before_trials(execution_.order, plan_, context.samples.count() - context.samples_done);
   chosen_ = first.chosen;
   if (first.to_be_tried) {
-    if (context.samples_before == 0) try_order(context, chosen_.order);
+    if (context.all_samples_done() == context.samples_restored) try_order(context, chosen_.order);
     std::vector<OrderTrial> trials;
     for (const Order order : kTriedOrders) trials.push_back(try_order(context, order));
     chosen_ = choose_by_trials(trials);

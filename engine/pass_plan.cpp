@@ -13,20 +13,23 @@ constexpr double kWorthwhile = 0.01;
 }  // namespace
 
 SampleSpan PassPlan::next(double seconds, uint64_t pixels) {
-  const uint32_t done = span_.end;
-  if (done > 0) sample_seconds_ = (seconds - began_) / (static_cast<double>(span_.count()) * static_cast<double>(pixels_));
+  const uint32_t done = state_.span.end;
+  if (state_.span.count() > 0) {
+    const double samples = static_cast<double>(state_.span.count()) * static_cast<double>(state_.pixels);
+    sample_seconds_ = (seconds - state_.began) / samples;
+  }
   uint32_t count = (levels_ ? std::min(next_level(done), most_) : most_) - done;
   if (limit_ > 0) count = std::min(count, done == 0 ? (levels_ ? 2 : 1) : fitting(limit_ - seconds, pixels));
   if (levels_) count &= ~1u;  // both halves
-  began_ = seconds;
-  pixels_ = pixels;
-  span_ = {done, done + count};
-  if (count > 0) ++passes_count_;
-  return span_;
+  state_.began = seconds;
+  state_.pixels = pixels;
+  state_.span = {done, done + count};
+  if (count > 0) ++state_.passes_count;
+  return state_.span;
 }
 
 uint32_t PassPlan::fitting(double seconds_left, uint64_t pixels) const {
-  const double done = span_.end, each = sample_seconds_ * static_cast<double>(pixels);
+  const double done = state_.span.end, each = sample_seconds_ * static_cast<double>(pixels);
   const double fit = each > 0 ? seconds_left / each : kGrowth * done;
   if (fit < std::max(1.0, kWorthwhile * done)) return 0;
   return static_cast<uint32_t>(std::min(kGrowth * done, std::max(1.0, kCareful * fit)));

@@ -14,6 +14,7 @@
 // Called by engine/render. Plain values: the time is passed in. One thread.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -25,17 +26,35 @@ class PassPlan {
  public:
   /// `limit_seconds`: 0: none.
   /// `levels`: as adaptive sampling takes them, of which `most_samples` must be even.
-  PassPlan(uint32_t most_samples, double limit_seconds, bool levels = false)
-      : most_(most_samples), limit_(limit_seconds), levels_(levels) {}
+  /// `first`: the samples before are nobody's concern. Requires: 0 with a limit or levels.
+  PassPlan(uint32_t most_samples, double limit_seconds, bool levels = false, uint32_t first = 0)
+      : most_(most_samples), limit_(limit_seconds), levels_(levels) {
+    state_.span = {first, first};
+  }
+
+  /// Where it stands: what checkpoints hold. Seconds since the render began, earlier parts of it included.
+  struct State {
+    SampleSpan span;            ///< of the pass under way
+    uint32_t passes_count = 0;
+    uint32_t reserved = 0;
+    uint64_t pixels = 1;        ///< of the pass
+    double began = 0;           ///< the pass, in seconds
+  };
+  const State& state() const { return state_; }
+  /// Goes on in the pass of an earlier render.
+  SampleSpan resume(const State& state) {
+    state_ = state;
+    return state_.span;
+  }
 
   /// What every pixel gets next, so many seconds after the render began, when the pass before has ended. An empty span:
   /// nothing, the render is over. `pixels`: that the next pass draws; only their ratio from pass to pass matters.
   SampleSpan next(double seconds, uint64_t pixels = 1);
   /// How many pixels the pass that next() named last draws, where next() was not told yet.
-  void begins_with(uint64_t pixels) { pixels_ = pixels; }
+  void begins_with(uint64_t pixels) { state_.pixels = pixels; }
 
-  uint32_t done() const { return span_.end; }
-  uint32_t passes_count() const { return passes_count_; }
+  uint32_t done() const { return state_.span.end; }
+  uint32_t passes_count() const { return state_.passes_count; }
 
  private:
   uint32_t fitting(double seconds_left, uint64_t pixels) const;
@@ -43,10 +62,7 @@ class PassPlan {
   uint32_t most_;
   double limit_;
   bool levels_;
-  uint64_t pixels_ = 1;  ///< of the last pass
-  SampleSpan span_;
-  uint32_t passes_count_ = 0;
-  double began_ = 0;           ///< the pass, in seconds
+  State state_;
   double sample_seconds_ = 0;  ///< that a sample of one of `pixels` took in the last pass
 };
 
@@ -63,6 +79,11 @@ struct Forecast {
   uint64_t samples_mark = 0;
   double seconds_mark = 0;
 
+  /// Of a render that goes on from another: what that has done. Before the first mark().
+  void begins_with(uint64_t samples_done, double seconds) {
+    samples_mark = samples_done;
+    if (limit_seconds > 0) limit_seconds = std::max(limit_seconds - seconds, 1e-9);
+  }
   /// A pass begins.
   void mark(uint64_t samples_done, double seconds);
   std::optional<double> seconds_left(uint64_t samples_done, double seconds) const;

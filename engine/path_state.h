@@ -14,8 +14,9 @@ namespace shoal {
 
 struct PathState {
   uint32_t pixel = 0;               ///< y * width + x in the film
-  uint32_t sample : 31 = 0;
-  uint32_t seeks : 1 = 0;           ///< AOVs: its next vertex is the first, or is seen in mirrors and glass only
+  uint32_t sample : 29 = 0;
+  uint32_t seeks : 2 = 0;           ///< AOVs: its next vertex is the first, or is seen in mirrors and glass only: PathSeeks
+  uint32_t under_way : 1 = 0;       ///< begun, and not in the film
   uint32_t bounce = 0;              ///< 0: the camera ray's hit is shaded next
   uint32_t flags : 2 = 0;           ///< PathFlags: the render loop's, not the shader's
   uint32_t light_side : 30 = 0;     ///< LightReceiver::side of the vertex before, the shader's; of the camera nothing
@@ -39,6 +40,13 @@ static_assert(sizeof(PathState) == 116);
 enum PathMedium : uint32_t {
   kPathMediumMask = 0x7fffffffu,
   kPathOneWavelength = 0x80000000u,  ///< its throughput is that of one wavelength
+};
+
+/// PathState::seeks: what of the path AOVs have still to see.
+enum PathSeeks : uint32_t {
+  kSeeksNothing = 0,
+  kSeeksSurface = 1,  ///< its first hit, and the albedo
+  kSeeksAlbedo = 2,   ///< the albedo; its first hit is in the layers
 };
 
 enum PathFlags : uint32_t {

@@ -12,7 +12,7 @@ namespace {
 /// Sleep between looks while other threads complete the first lattice of a preview.
 constexpr std::chrono::microseconds kFirstLatticeWait{200};
 
-class PathStream final : public RayStream {
+class PathStream final : public RayStream, public UnfinishedPaths {
  public:
   PathStream(RenderContext& context, unsigned thread, Order order, const MakeTraversal& make)
       : context_(context),
@@ -22,10 +22,16 @@ class PathStream final : public RayStream {
         traversal_(make(context.scene.top_tree, paths_.pages.data(), context.picture.shading.triangle_test)) {}
 
   void run() {
+    const PauseGate::Member member(context_.gate);
+    const PauseGate::Source source(context_.gate, *this);
     worker_.enter(Phase::kTraversal);
     traversal_->trace(*this, worker_.trace_counters());
     for (PagePin& pin : paths_.pins) pin.reset();
     worker_.hand_in();
+  }
+
+  void each_unfinished(const VisitUnfinished& visit) const override {
+    for (uint32_t path = 0; path < paths_.capacity; ++path) visit_unfinished(paths_.states[path], visit);
   }
 
   Ray* next() override {

@@ -9,13 +9,14 @@
 #include <memory>
 
 #include "engine/path_state.h"
+#include "engine/pause_gate.h"
 #include "io/huge_memory.h"
 #include "queues/path_lists.h"
 #include "queues/treelet_queues.h"
 
 namespace shoal {
 
-class QueuedPaths {
+class QueuedPaths final : public UnfinishedPaths {
  public:
   QueuedPaths(uint32_t treelet_count, uint32_t path_count, unsigned threads)
       : rays(treelet_count, path_count, threads),
@@ -41,6 +42,9 @@ class QueuedPaths {
     __builtin_prefetch(bytes + sizeof(PathState) - 1, 1);
   }
   uint32_t path_count() const { return path_count_; }
+  void each_unfinished(const VisitUnfinished& visit) const override {
+    for (uint32_t path = 0; path < untouched_; ++path) visit_unfinished(states_[path], visit);
+  }
 
   /// Takes up to `wanted` free paths as a list linked by PathState::next; returns how many.
   uint32_t take_free(uint32_t wanted, uint32_t* first) {

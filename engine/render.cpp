@@ -8,9 +8,13 @@
 
 #include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
+#include "engine/checkpoint.h"
 #include "engine/clock.h"
+#include "engine/merge_sums.h"
 #include "engine/order_runner.h"
+#include "engine/picture_identity.h"
 #include "engine/preview.h"
+#include "engine/render_report.h"
 #include "treelets/scene_traversal.h"
 
 namespace shoal {
@@ -42,6 +46,9 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
     return Error{ErrorCode::kUsage, fmt::format("packets of {} rays: expected a power of two from {} to {}",
                                                 execution.packet_rays, kLeastPacketRays, kMostPacketRays)};
   }
+  if (execution.time_limit_seconds > 0 && picture.range.count() > 0) {
+    return Error{ErrorCode::kUsage, "a range of samples with a time limit: it must be complete"};
+  }
   return check_policies(execution);
 }
 
@@ -53,9 +60,13 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
-/// Samples a pixel at most. With a target for noise both halves have as many.
-uint32_t most_samples(const PictureOptions& picture) {
-  return picture.noise.asked() ? std::max(picture.samples & ~1u, 2u) : picture.samples;
+/// The samples of a pass, of what adaptive sampling draws of the picture.
+SampleOrder order_of(const PictureOptions& picture, SampleSpan span, const AdaptiveSampling* adaptive,
+                     uint32_t coarse_levels) {
+  if (adaptive != nullptr && !adaptive->whole_picture()) {
+    return SampleOrder(picture.width, picture.height, span, adaptive->blocks());
+  }
+  return SampleOrder(picture.width, picture.height, span, picture.tile_sample, coarse_levels);
 }
 
 /// Runs the orders over pass after pass. `samples`: of the first, is what context.samples names; of the last in the end.
@@ -71,16 +82,48 @@ void render_passes(RenderContext& context, PassPlan& passes, SampleOrder& sample
       if (adaptive->blocks().empty()) return;
       context.forecast.samples_total = context.samples_before + adaptive->expected_samples(most_samples(picture));
     }
-    const double seconds = now_seconds() - context.start_seconds;
+    const double seconds = context.seconds_before + now_seconds() - context.start_seconds;
     const SampleSpan span = passes.next(seconds, adaptive != nullptr ? adaptive->drawn_pixels() : 1);
     if (span.count() == 0) return;
-    if (adaptive != nullptr && !adaptive->whole_picture()) {
-      samples = SampleOrder(picture.width, picture.height, span, adaptive->blocks());
-    } else {
-      samples = SampleOrder(picture.width, picture.height, span, picture.tile_sample);
-    }
+    samples = order_of(picture, span, adaptive, 0);
   }
 }
+
+/// What a render adds up.
+struct RenderSums {
+  Film film;
+  std::optional<AdaptiveSampling> adaptive;
+  std::unique_ptr<AovFilm> aovs;
+
+  static Result<RenderSums> create(const Scene& scene, const PictureOptions& picture, unsigned threads) {
+    const uint32_t width = picture.width, height = picture.height;
+    RenderSums sums{Film(width, height, picture.noise.asked() ? 2 : 1), {}, {}};
+    if (picture.noise.asked()) sums.adaptive.emplace(width, height, picture.noise, threads);
+    if (!picture.aovs.empty()) {
+      SHOAL_ASSIGN_OR_RETURN(sums.aovs, AovFilm::create(picture.aovs, width, height, *scene.file));
+    }
+    return sums;
+  }
+  PictureSums all() { return {film, aovs.get(), adaptive ? &*adaptive : nullptr}; }
+};
+
+/// Where the render begins: what is known of the picture for sums that are kept, and a checkpoint of it to go on from.
+struct Beginning {
+  std::string identity;
+  std::unique_ptr<SumsFile> earlier;  ///< or none
+
+  static Result<Beginning> find(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
+                                ExecutionOptions& execution) {
+    Beginning beginning;
+    if (execution.checkpoint.path.empty() && execution.sums_path.empty()) return beginning;
+    SHOAL_ASSIGN_OR_RETURN(beginning.identity, picture_identity(fs, scene, picture));
+    if (!execution.checkpoint.resume) return beginning;
+    SHOAL_ASSIGN_OR_RETURN(beginning.earlier,
+                           open_checkpoint(fs, execution.checkpoint.path, beginning.identity, picture));
+    execution.checkpoint.unfinished_count = beginning.earlier->header().unfinished_count;
+    return beginning;
+  }
+};
 
 /// Of the pixels that are rendered.
 SampleReport report_samples(const RenderContext& context, uint64_t pixels, uint32_t passes_count) {
@@ -97,9 +140,9 @@ SampleReport report_samples(const RenderContext& context, uint64_t pixels, uint3
   return report;
 }
 
-/// What a complete render of so many pixels leaves. Ends the preview, whose memory goes before that of the floats is taken.
+/// What a complete render of so many pixels leaves; `resolved`: the picture as well. Ends the preview, whose memory goes before that of the floats is taken.
 RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, uint64_t pixels,
-                           std::optional<Preview>& preview) {
+                           std::optional<Preview>& preview, bool resolved) {
   const PictureOptions& picture = context.picture;
   RenderResult result;
   if (preview) {
@@ -110,8 +153,11 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, uint6
     context.preview = nullptr;
     preview.reset();
   }
-  result.rgba = context.film.resolve();
-  if (context.aovs != nullptr) result.layers = context.aovs->resolve(context.film);
+  if (resolved) {
+    result.rgba = context.film.resolve();
+    if (context.aovs != nullptr) result.layers = context.aovs->resolve(context.film);
+  }
+  if (context.seconds_before > 0) result.resumed = ResumedFrom{context.samples_restored, context.seconds_before};
   result.counters = context.counters;
   result.plan = plan;
   result.threads = context.threads;
@@ -158,6 +204,17 @@ Status check_picture(const PictureOptions& picture) {
   if (picture.samples == 0 || picture.samples > (1u << 22)) {
     return Error{ErrorCode::kUsage, fmt::format("{} samples a pixel: must be 1 to {}", picture.samples, 1u << 22)};
   }
+  if (picture.range.count() > 0 || picture.range.begin > 0) {
+    const SampleSpan& range = picture.range;
+    if (range.begin >= range.end || range.end > picture.samples) {
+      return Error{ErrorCode::kUsage, fmt::format("samples {} to {} of {}: the first must be less than the last, which is not "
+                                                  "among them and at most as many as the picture has",
+                                                  range.begin, range.end, picture.samples)};
+    }
+    if (picture.noise.asked()) {
+      return Error{ErrorCode::kUsage, "a range of samples with a target for noise: which are drawn depends on all before"};
+    }
+  }
   const ShadingOptions& shading = picture.shading;
   for (const float limit : {shading.clamp_direct, shading.clamp_indirect}) {
     if (!(limit >= 0) || std::isinf(limit)) {
@@ -177,6 +234,8 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(check_options(scene, picture, asked));
   ExecutionOptions execution = asked;
   if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
+  SHOAL_ASSIGN_OR_RETURN(Beginning beginning, Beginning::find(fs, scene, picture, execution));
+  SumsFile* const earlier = beginning.earlier.get();
   SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading,
                                                                                         execution.threads));
   SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, *tables, picture, execution));
@@ -188,50 +247,65 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const Camera camera(seen_by, picture.width, picture.height, lens ? picture.lens : pinhole(picture.lens),
                       camera_keys(scene, seen_by, picture.shading.effects));
   const bool previewed = !execution.preview.path.empty();
-  const bool asked_noise = picture.noise.asked();
-  PassPlan passes(most_samples(picture), execution.time_limit_seconds, asked_noise);
-  SampleOrder samples(picture.width, picture.height, passes.next(now_seconds() - start), picture.tile_sample,
-                      previewed ? coarse_levels(plan) : 0);
+  const SampleSpan range = asked_range(picture);
+  SHOAL_ASSIGN_OR_RETURN(RenderSums sums, RenderSums::create(scene, picture, execution.threads));
+  PassPlan passes(range.end, execution.time_limit_seconds, picture.noise.asked(), range.begin);
+  uint32_t levels = previewed ? coarse_levels(plan) : 0;
+  if (earlier != nullptr) {
+    SHOAL_RETURN_IF_ERROR(earlier->read_sums(sums.all()));
+    passes.resume(earlier->header().pass);
+    levels = earlier->header().coarse_levels;
+  } else {
+    passes.next(now_seconds() - start);
+  }
+  const uint64_t pixels = order_of(picture, passes.state().span, nullptr, 0).pixel_count();
+  if (earlier == nullptr && sums.adaptive) passes.begins_with(pixels);
+  SampleOrder samples = order_of(picture, passes.state().span, sums.all().adaptive, levels);
   const Sampler sampler(picture.shading.sampler, picture.shading.seed, picture.width, picture.height, most_samples(picture),
-                        asked_noise ? SampleSets::kHalves : SampleSets::kOne);
-  const uint64_t pixels = samples.pixel_count();
-  Film film(picture.width, picture.height, asked_noise ? 2 : 1);
-  std::optional<AdaptiveSampling> adaptive;
-  if (asked_noise) {
-    adaptive.emplace(picture.width, picture.height, picture.noise, execution.threads);
-    passes.begins_with(pixels);
-  }
-  std::unique_ptr<AovFilm> aovs;
-  if (!picture.aovs.empty()) {
-    SHOAL_ASSIGN_OR_RETURN(aovs, AovFilm::create(picture.aovs, picture.width, picture.height, *scene.file));
-  }
+                        sums.adaptive ? SampleSets::kHalves : SampleSets::kOne);
   std::optional<Preview> preview;
-  if (previewed) preview.emplace(fs, execution.preview, film, samples, execution.threads, start, hooks.warning);
-  OrderRunner orders(scene, execution, plan, samples.count());
+  if (previewed) preview.emplace(fs, execution.preview, sums.film, samples, execution.threads, start, hooks.warning);
+  OrderRunner orders(scene, execution, plan, samples.count() - (earlier != nullptr ? earlier->done_in_pass() : 0));
   PageCache cache(*scene.file, plan.cache_bytes,
                   [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
                     return check_page(scene, record, bytes);
                   },
                   orders.waiting_work(), execution.paging);
   if (execution.mapped_pages != nullptr) cache.serve_from(execution.mapped_pages);
-  RenderContext context{scene, picture, *tables, camera, samples, sampler, hooks, cache, film, execution.threads};
+  RenderContext context{scene, picture, *tables, camera, samples, sampler, hooks, cache, sums.film, execution.threads};
   context.start_seconds = start;
   context.phases.assign(execution.threads, PhaseClock(start_ticks));
   if (preview) context.preview = &*preview;
-  context.aovs = aovs.get();
-  if (adaptive) context.adaptive = &*adaptive;
-  context.forecast = {asked_noise ? 0 : pixels * picture.samples, execution.time_limit_seconds};
-  context.forecast.mark(0, now_seconds() - start);
+  context.aovs = sums.aovs.get();
+  context.adaptive = sums.all().adaptive;
+  if (earlier != nullptr) SHOAL_RETURN_IF_ERROR(resume_cursor(*earlier, context));
+  beginning.earlier.reset();
+  SumsHeader header = sums_header(picture, SumsKind::kCheckpoint);
+  header.coarse_levels = levels;
+  std::optional<Checkpoints> checkpoints;
+  if (!execution.checkpoint.path.empty()) {
+    context.checkpoints = &checkpoints.emplace(fs, execution.checkpoint, beginning.identity, header, passes, sums.all(),
+                                               hooks.warning);
+  }
+  context.forecast = {sums.adaptive ? 0 : pixels * range.count(), execution.time_limit_seconds};
+  context.forecast.begins_with(context.samples_restored, context.seconds_before);
+  context.forecast.mark(context.samples_restored, now_seconds() - start);
   render_passes(context, passes, samples, orders);
   orders.release();
   cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
-  SHOAL_RETURN_IF_ERROR(check_identities(context.counters, context.samples_before));
-  RenderResult result = finish_result(context, plan, pixels, preview);
+  SHOAL_RETURN_IF_ERROR(check_identities(context.counters, context.samples_before - context.samples_restored));
+  if (!execution.sums_path.empty()) {
+    const std::string attributes = attributes_text(described_image(scene, picture));
+    SumsHeader part = sums_header(picture, SumsKind::kPart);
+    part.seconds = context.seconds_before + now_seconds() - start;
+    SHOAL_RETURN_IF_ERROR(write_sums(fs, execution.sums_path, part, beginning.identity, attributes, sums.all(), nullptr));
+  }
+  RenderResult result = finish_result(context, plan, pixels, preview, execution.sums_path.empty());
   result.order = orders.chosen();
   result.samples = report_samples(context, pixels, passes.passes_count());
-  if (adaptive) result.noise = adaptive->finish(film, result.standard_errors);
+  if (sums.adaptive) result.noise = sums.adaptive->finish(sums.film, result.standard_errors);
   take_times(context, start_ticks, result);
   return result;
 }

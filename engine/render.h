@@ -12,11 +12,13 @@
 #include <vector>
 
 #include "engine/aov.h"
+#include "engine/checkpoint_options.h"
 #include "engine/counters.h"
 #include "engine/lens.h"
 #include "engine/memory_plan.h"
 #include "engine/noise_target.h"
 #include "engine/phase_clock.h"
+#include "engine/sample_order.h"
 #include "engine/scene.h"
 #include "engine/shade.h"
 #include "engine/tonemap.h"
@@ -30,6 +32,7 @@ namespace shoal {
 struct PictureOptions {
   uint32_t width = 512, height = 512;
   uint32_t samples = 16;  ///< with a target for noise: at most
+  SampleSpan range;       ///< of `samples`, those that are drawn; without any: all
   NoiseTarget noise;      ///< asked for: samples are drawn where it is not met (engine/adaptive_sampling.h)
   uint32_t camera = 0;  ///< index among the scene's cameras; a scene without one is framed
   LensOptions lens;     ///< what the picture asks of the camera beyond its record
@@ -89,8 +92,10 @@ struct ExecutionOptions {
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
   PreviewOptions preview;
+  CheckpointOptions checkpoint;
+  std::string sums_path;            ///< raw sums are written there (engine/sums_file.h) instead of making a picture
   /// Ends the render when so many seconds have gone by since it began, within a pass (engine/pass_plan.h): with the
-  /// picture of RenderResult::samples samples a pixel. 0: none.
+  /// picture of RenderResult::samples samples a pixel. Those of renders that it goes on from count. 0: none.
   double time_limit_seconds = 0;
 };
 
@@ -107,6 +112,7 @@ struct RenderProgress {
   std::optional<FirstPicture> first_picture;  ///< as soon as there is one; never without a preview
   double fraction = 0;                 ///< of the work, or of the time limit, that is done: whichever is more
   std::optional<double> seconds_left;  ///< as far as that can be told yet
+  uint64_t samples_before = 0;         ///< of samples_done, those of a render that this one goes on from
 };
 
 class RayRecorder;
@@ -129,7 +135,7 @@ struct SampleReport {
 };
 
 struct RenderResult {
-  std::vector<float> rgba;  ///< width * height * 4
+  std::vector<float> rgba;  ///< width * height * 4; none with ExecutionOptions::sums_path
   SampleReport samples;
   std::optional<NoiseReached> noise;   ///< with a target for noise, when there were enough samples to tell
   std::vector<float> standard_errors;  ///< then: width * height, of luminance
@@ -144,6 +150,7 @@ struct RenderResult {
   std::string read_backend;  ///< PageCache::read_backend()
   double picture_share = 1;  ///< share of the pixels that were rendered (PictureOptions::tile_sample)
   std::optional<FirstPicture> first_picture;  ///< none without a preview, or when none could be written
+  std::optional<ResumedFrom> resumed;  ///< went on from a checkpoint: counters and seconds are of what came after
   uint32_t previews_count = 0;                ///< written while rendering
   double preview_seconds = 0;                 ///< spent drawing and writing them, summed over threads
 };
@@ -152,7 +159,7 @@ struct RenderResult {
 Status check_picture(const PictureOptions& picture);
 
 /// Renders and checks the counters' identities. Fails with: kInternal (they do not balance), kCorrupt, kStorage,
-/// kMemoryCap, kStopped, kInput (environment).
+/// kMemoryCap, kStopped (with a checkpoint, it is written), kInput (environment, a checkpoint of another picture).
 Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
                             const ExecutionOptions& execution, const RenderHooks& hooks = {});
 

@@ -17,13 +17,15 @@ constexpr std::chrono::microseconds kFirstLatticeWait{200};
 /// Paths under way in a thread, at most: twice the rays that the kernels take in turn (treelets/trace_treelets.cpp).
 constexpr uint32_t kMaxPaths = 32;
 
-class DepthFirstWorker {
+class DepthFirstWorker final : public UnfinishedPaths {
  public:
   DepthFirstWorker(RenderContext& context, unsigned thread) : context_(context), worker_(context, thread) {
     path_count_ = rays_under_way(context.cache, *context.scene.file, context.threads, kMaxPaths);
   }
 
   void run() {
+    const PauseGate::Member member(context_.gate);
+    const PauseGate::Source source(context_.gate, *this);
     while (!context_.ended.load(std::memory_order_relaxed)) {
       const bool first_lattice = context_.next_sample < context_.samples.first_lattice_count();
       const SampleRange samples = context_.begin_samples(first_lattice ? kFirstSamplesPerGrab : kSamplesPerGrab);
@@ -38,6 +40,11 @@ class DepthFirstWorker {
     worker_.hand_in();
   }
 
+  void each_unfinished(const VisitUnfinished& visit) const override {
+    for (const Path& path : paths_) visit_unfinished(path.state, visit);
+    for (uint64_t sample = next_; sample < last_; ++sample) visit(context_.sample_at(sample));
+  }
+
  private:
   /// A path under way. Its rays travel one after the other.
   struct Path {
@@ -48,8 +55,8 @@ class DepthFirstWorker {
   };
 
   void run_paths(const SampleRange& samples) {
-    uint64_t next = samples.first;
-    for (uint32_t i = 0; i < path_count_ && next < samples.last; ++i) begin(i, next++);
+    next_ = samples.first, last_ = samples.last;
+    for (uint32_t i = 0; i < path_count_ && next_ < last_; ++i) begin(i, next_++);
     const auto decide = [&](uint32_t slot, const GroupRay& member, TreeletId treelet) -> const std::byte* {
       if (treelet != kNoIndex) return pin(slot, member, treelet);
       pins_[slot].reset();
@@ -62,8 +69,9 @@ class DepthFirstWorker {
       finish_rays();
       while (ready_count_ > 0) {
         const uint32_t index = ready_[--ready_count_];
-        if (!go_on(index) && next < samples.last) begin(index, next++);
+        if (!go_on(index) && next_ < last_) begin(index, next_++);
       }
+      worker_.safe_point();
     }
     if (group_.size() > 0) drop_rays();
   }
@@ -143,6 +151,7 @@ class DepthFirstWorker {
   PagePin pins_[RayGroup::kCapacity];  ///< by slot of the group
   TreeletId treelets_[RayGroup::kCapacity] = {};
   Path paths_[kMaxPaths];
+  uint64_t next_ = 0, last_ = 0;  ///< of the samples taken, those that are not begun
   uint32_t home_[kMaxPaths];   ///< slots of the rays that came home in this step
   uint32_t home_count_ = 0;
   uint32_t ready_[kMaxPaths];  ///< their paths

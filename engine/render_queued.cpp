@@ -19,7 +19,7 @@ constexpr uint32_t kEndedBatch = 64;
 /// A thread with nothing to do looks again after this long, whatever the disk does.
 constexpr std::chrono::microseconds kLoadWait{1000};
 
-class QueuedWorker {
+class QueuedWorker final : public UnfinishedPaths {
  public:
   QueuedWorker(RenderContext& context, unsigned thread, QueuedPaths& paths, TreeletScheduler& scheduler,
                UsualBatches& batches)
@@ -33,6 +33,8 @@ class QueuedWorker {
         ended_(paths) {}
 
   void run() {
+    const PauseGate::Member member(context_.gate);
+    const PauseGate::Source source(context_.gate, *this);
     while (!context_.ended.load(std::memory_order_relaxed) && context_.samples_done < context_.end_sample) {
       while (room_for(admit_batch_)) {
         admit(admit_batch_);
@@ -56,6 +58,10 @@ class QueuedWorker {
     worker_.hand_in();
   }
 
+  void each_unfinished(const VisitUnfinished& visit) const override {
+    for (uint64_t sample = taken_.first; sample < taken_.last; ++sample) visit(context_.sample_at(sample));
+  }
+
  private:
   /// Whether so many new paths could begin now.
   bool room_for(uint32_t paths) const {
@@ -68,13 +74,14 @@ class QueuedWorker {
     worker_.enter(Phase::kPaths);
     uint32_t path = kNoIndex;
     const uint32_t taken = paths_.take_free(wanted, &path);
-    const SampleRange samples = context_.begin_samples(taken);
+    taken_ = context_.begin_samples(taken);
     uint32_t i = 0;
     travel([&] {
-      if (i == samples.size()) return false;
+      if (taken_.size() == 0) return false;
       const uint32_t current = path;
       path = paths_.state(current).next;
-      fresh(worker_.begin_path(samples.first + i++, current, paths_.state(current)));
+      fresh(worker_.begin_path(taken_.first++, current, paths_.state(current)));
+      ++i;
       return true;
     });
     for (; i < taken; ++i) {
@@ -151,6 +158,7 @@ class QueuedWorker {
       worker_.step(group_, Phase::kQueue, decide,
                    [this](const Ray& ray) { return paths_.state(path_index_of(ray)).pixel; });
       finish_rays();
+      worker_.safe_point();
     }
     if (context_.ended.load(std::memory_order_relaxed)) {
       outbox_.clear();
@@ -230,6 +238,7 @@ class QueuedWorker {
   UsualBatches& batches_;
   RenderWorker worker_;
   uint32_t admit_batch_;
+  SampleRange taken_;  ///< samples that this thread is beginning
   RayGroup group_;
   uint32_t home_[RayGroup::kCapacity];  ///< slots of the rays that came home in this step
   uint32_t home_count_ = 0;
@@ -245,6 +254,7 @@ class QueuedWorker {
 }  // namespace
 
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches) {
+  const PauseGate::Source source(context.gate, paths);
   run_on_threads(context, [&](unsigned thread) {
     std::make_unique<QueuedWorker>(context, thread, paths, scheduler, batches)->run();
   });

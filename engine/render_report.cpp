@@ -76,6 +76,7 @@ Json plan_json(const MemoryPlan& plan) {
           {"preview_bytes", plan.preview_bytes},
           {"aov_bytes", plan.aov_bytes},
           {"noise_bytes", plan.noise_bytes},
+          {"checkpoint_bytes", plan.checkpoint_bytes},
           {"path_state_bytes", plan.path_state_bytes},
           {"ray_bytes", plan.ray_bytes},
           {"paths_bytes", plan.paths_bytes()},
@@ -139,6 +140,8 @@ Json options_json(const RenderResult& result, const Scene& scene, const PictureO
   return {{"width", picture.width},
           {"height", picture.height},
           {"samples_per_pixel", picture.samples},
+          {"sample_range", picture.range.count() > 0 ? Json::array({picture.range.begin, picture.range.end}) : Json()},
+          {"checkpoint_seconds", execution.checkpoint.every_seconds},
           {"time_limit_seconds", execution.time_limit_seconds},
           {"target_noise_median", picture.noise.median},
           {"target_noise_percentile_95", picture.noise.percentile_95},
@@ -225,35 +228,45 @@ EffectAskers effect_askers(const PictureOptions& picture) {
   return askers;
 }
 
-ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture) {
-  ExrImage image;
-  image.width = picture.width;
-  image.height = picture.height;
-  const size_t pixels = result.rgba.size() / 4;
+void add_channels(const std::vector<float>& rgba, const std::vector<ExrChannel>& layers, ExrImage& image) {
+  const size_t pixels = rgba.size() / 4;
   static constexpr const char* kNames[] = {"R", "G", "B", "A"};
   for (size_t c = 0; c < 4; ++c) {
     ExrChannel channel{kNames[c], false, std::vector<float>(pixels)};
-    for (size_t i = 0; i < pixels; ++i) channel.values[i] = result.rgba[i * 4 + c];
+    for (size_t i = 0; i < pixels; ++i) channel.values[i] = rgba[i * 4 + c];
     image.channels.push_back(std::move(channel));
   }
-  image.channels.insert(image.channels.end(), result.layers.begin(), result.layers.end());
+  image.channels.insert(image.channels.end(), layers.begin(), layers.end());
+}
+
+ExrImage described_image(const Scene& scene, const PictureOptions& picture) {
+  ExrImage image;
+  image.width = picture.width;
+  image.height = picture.height;
   const CameraRecord record =
       scene.cameras.empty() ? frame_camera(scene.top_tree.bounds()) : scene.cameras[picture.camera];
   const CameraRecord camera = seen_through(record, picture.lens);
   const float aspect = static_cast<float>(picture.width) / static_cast<float>(picture.height);
   const Matrix to_camera = world_to_camera(camera.camera_to_world);
   image.text["software"] = "Shoal " SHOAL_VERSION;
-  image.numbers["renderTimeSeconds"] = static_cast<float>(result.seconds);
-  image.numbers["samplesPerPixel"] = static_cast<float>(result.samples.mean);
   add_accuracy(picture.shading, image);
-  if (result.noise) {
-    image.numbers["noiseMedian"] = result.noise->median;
-    image.numbers["noisePercentile95"] = result.noise->percentile_95;
-  }
   image.matrices["worldToCamera"] = to_camera;
   const Projection projection = projection_of(record, picture.lens);
   const bool flat = projection == Projection::kPerspective || projection == Projection::kOrthographic;
   if (flat) image.matrices["worldToNDC"] = multiply(to_camera, camera_to_ndc(camera, aspect));
+  return image;
+}
+
+ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture) {
+  ExrImage image = described_image(scene, picture);
+  add_channels(result.rgba, result.layers, image);
+  const double before = result.resumed ? result.resumed->seconds : 0;
+  image.numbers["renderTimeSeconds"] = static_cast<float>(before + result.seconds);
+  image.numbers["samplesPerPixel"] = static_cast<float>(result.samples.mean);
+  if (result.noise) {
+    image.numbers["noiseMedian"] = result.noise->median;
+    image.numbers["noisePercentile95"] = result.noise->percentile_95;
+  }
   return image;
 }
 
@@ -280,6 +293,10 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
   json["memory"]["peak_cache_bytes"] = result.peak_cache_bytes;
   json["memory"]["peak_rss_bytes"] = peak_resident_set_bytes();
   json["render_seconds"] = result.seconds;
+  json["resumed_from"] = nullptr;
+  if (result.resumed) {
+    json["resumed_from"] = {{"samples_count", result.resumed->samples}, {"render_seconds", result.resumed->seconds}};
+  }
   json["picture_share"] = result.picture_share;
   json["samples"] = {{"mean", result.samples.mean},
                      {"least", result.samples.least},

@@ -15,6 +15,11 @@ namespace shoal {
 /// worldToNDC.
 ExrImage picture_image(const RenderResult& result, const Scene& scene, const PictureOptions& picture);
 
+/// Without channels: the attributes that follow from scene and options.
+ExrImage described_image(const Scene& scene, const PictureOptions& picture);
+/// Adds R, G, B, A and the layers.
+void add_channels(const std::vector<float>& rgba, const std::vector<ExrChannel>& layers, ExrImage& image);
+
 /// What of the options asks for effects.
 EffectAskers effect_askers(const PictureOptions& picture);
 

@@ -43,6 +43,7 @@ class SortedWorker {
 
   /// Traces its share of the wave's `count` rays, and shades.
   void trace(uint64_t count) {
+    const PauseGate::Member pausing(context_.gate);
     grab_ = std::clamp<uint64_t>(count / (8 * context_.threads), 1, kRaysPerGrab);
     count_ = count;
     place_ = last_ = 0;
@@ -61,6 +62,7 @@ class SortedWorker {
       for (uint32_t i = 0; i < ready_count_; ++i) vertex_ready(ready_[i]);
       ready_count_ = 0;
       if (group_limit_ == 1) worker_.let_go();  // the cache may have room for one page a thread
+      worker_.safe_point();
     }
     worker_.let_go();
     group_.clear();
@@ -159,6 +161,7 @@ class SortedWorker {
 }  // namespace
 
 void render_sorted(RenderContext& context, SortedPaths& paths) {
+  const PauseGate::Source source(context.gate, paths);
   const unsigned threads = context.threads;
   std::atomic<uint64_t> next_place{0};
   std::vector<std::unique_ptr<SortedWorker>> workers;

@@ -9,6 +9,7 @@
 
 #include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
+#include "engine/checkpoint.h"
 #include "engine/clock.h"
 #include "engine/preview.h"
 #include "engine/ray_list.h"
@@ -54,6 +55,8 @@ SampleRange RenderContext::begin_samples(uint64_t wanted) {
 void RenderContext::end_pass() {
   samples_before += samples_done;
   next_sample = samples_done = end_sample = 0;
+  again.clear();
+  again_first = 0;
   forecast.mark(samples_before, now_seconds() - start_seconds);
 }
 
@@ -105,11 +108,13 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
 Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& path) {
   enter(Phase::kPaths);
   if (context_.list != nullptr) return begin_listed(index, path_index, path);
-  const PixelSample sample = context_.samples.at(index);
-  path.pixel = sample.y * context_.picture.width + sample.x;
+  const UnfinishedSample sample = context_.sample_at(index);
+  const uint32_t x = sample.pixel % context_.picture.width, y = sample.pixel / context_.picture.width;
+  path.pixel = sample.pixel;
   path.sample = sample.sample;
   path.bounce = 0;
-  path.seeks = seeks_ && counts(path.pixel, path.sample);
+  path.seeks = seeks_ && counts(path.pixel, path.sample) ? sample.seeks & 3 : kSeeksNothing;
+  path.under_way = 1;
   path.flags = kPathGoesOn;
   path.throughput = Vec3(1);
   path.bsdf_pdf = 0;
@@ -123,8 +128,8 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   const Camera& camera = context_.camera;
   const CameraRay camera_ray =
       camera.moves()
-          ? camera.at(time_of(path, sampler, ShutterTimes::kSpread)).ray(sample.x, sample.y, in_pixel, on_lens)
-          : camera.ray(sample.x, sample.y, in_pixel, on_lens);
+          ? camera.at(time_of(path, sampler, ShutterTimes::kSpread)).ray(x, y, in_pixel, on_lens)
+          : camera.ray(x, y, in_pixel, on_lens);
   path.origin = camera_ray.origin;
   path.direction = camera_ray.direction;
   path.cone = camera_cone_;
@@ -238,8 +243,9 @@ bool RenderWorker::counts(uint32_t pixel, uint32_t sample) const {
   return context_.adaptive == nullptr || context_.adaptive->counts(pixel, sample);
 }
 
-void RenderWorker::end_path(const PathState& path) {
+void RenderWorker::end_path(PathState& path) {
   enter(Phase::kPaths);
+  path.under_way = 0;
   if (context_.list != nullptr) {
     ++counters_.samples_committed_count;
     counters_.path_state_moved_bytes += sizeof(PathState);
@@ -326,9 +332,13 @@ void RenderWorker::report_progress() {
   enter(Phase::kReporting);
   context_.disk_read_bytes += cache_counters_.disk_read_bytes - disk_bytes_reported_;
   disk_bytes_reported_ = cache_counters_.disk_read_bytes;
-  if (context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed)) {
+  const bool stop = context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed);
+  if (context_.checkpoints != nullptr) {
+    context_.checkpoints->write_when_due(context_, stop);
+  } else if (stop) {
     context_.fail({ErrorCode::kStopped, "the render was stopped before it was complete"});
   }
+  safe_point();
   if (Status failure = context_.cache.failure(); !failure.ok()) context_.fail(std::move(failure).error());
   if (context_.preview != nullptr && !context_.ended) context_.preview->show_when_due(context_.all_samples_done());
   if (!context_.hooks.progress) return;
@@ -341,7 +351,8 @@ void RenderWorker::report_progress() {
   context_.hooks.progress({done, context_.forecast.samples_total,
                            context_.disk_read_bytes + context_.cache.background_read_bytes(), seconds,
                            context_.preview != nullptr ? context_.preview->first() : std::nullopt,
-                           context_.forecast.fraction(done, seconds), context_.forecast.seconds_left(done, seconds)});
+                           context_.forecast.fraction(done, seconds), context_.forecast.seconds_left(done, seconds),
+                           context_.samples_restored});
 }
 
 void add_cache_counters(const CacheCounters& cache, RenderCounters& c) {

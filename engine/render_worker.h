@@ -9,6 +9,7 @@
 #include "engine/film.h"
 #include "engine/pass_plan.h"
 #include "engine/path_ray.h"
+#include "engine/pause_gate.h"
 #include "engine/phase_clock.h"
 #include "engine/ray_group.h"
 #include "engine/render.h"
@@ -20,6 +21,7 @@ namespace shoal {
 
 class AdaptiveSampling;
 class AovFilm;
+class Checkpoints;
 class Preview;
 class RayList;
 
@@ -47,6 +49,8 @@ struct RenderContext {
   RayList* list = nullptr;  ///< or none; else sample i is its ray i, and there is no camera, no shading and no film
   InnerLoop inner_loop = InnerLoop::kMoreNumerous;  ///< of step(); set while no order runs, as the next
   uint32_t packet_rays = 64;                        ///< ExecutionOptions
+  Checkpoints* checkpoints = nullptr;    ///< or none
+  PauseGate gate{};                      ///< of the threads, for checkpoints
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -61,11 +65,23 @@ struct RenderContext {
   Status error{};
   RenderCounters counters{};
   double start_seconds = 0;
+  double seconds_before = 0;  ///< of the renders that this one goes on from
+  /// Of a pass that was interrupted: what was begun and not finished then begins again first. The samples with indices
+  /// from `again_first` on are these.
+  std::vector<UnfinishedSample> again{};
+  uint64_t again_first = 0;
+  uint64_t samples_restored = 0;  ///< of all_samples_done(), those that an earlier render did
   std::vector<PhaseClock> phases{};  ///< one a thread, since the render began
 
   void fail(Error error);
   /// Takes up to `wanted` samples that nobody has begun; none are left, for now or for good, when it is empty.
   SampleRange begin_samples(uint64_t wanted);
+  /// What the index of begin_samples() stands for.
+  UnfinishedSample sample_at(uint64_t index) const {
+    if (index - again_first < again.size()) return again[index - again_first];
+    const PixelSample sample = samples.at(index);
+    return {sample.y * picture.width + sample.x, sample.sample, kSeeksSurface};
+  }
   /// To be called when all threads have ended a pass: the next counts from 0.
   void end_pass();
   uint64_t all_samples_done() const { return samples_before + samples_done; }
@@ -92,6 +108,11 @@ class RenderWorker {
 
   /// What this thread does from now on. The functions below that take long enter their phase themselves.
   void enter(Phase phase) { phases_.enter(phase); }
+
+  /// To be called where no path is half dealt with (engine/pause_gate.h), and often.
+  void safe_point() {
+    if (context_.gate.paused()) context_.gate.wait();
+  }
 
   /// Begins sample `index` in `path`; returns its camera ray, or the ray of the list.
   Ray begin_path(uint64_t index, uint32_t path_index, PathState& path);
@@ -125,7 +146,7 @@ class RenderWorker {
   /// Whether a sample is part of the picture, or only helps to decide where to draw more.
   bool counts(uint32_t pixel, uint32_t sample) const;
   /// Adds the path to the film.
-  void end_path(const PathState& path);
+  void end_path(PathState& path);
 
   /// Cost maps. Treelets that a ray of the pixel entered:
   bool counts_treelets() const { return visits_aovs_ != nullptr; }
@@ -170,7 +191,8 @@ class RenderWorker {
   RenderCounters& counters() { return counters_; }
   TraceCounters& trace_counters() { return trace_counters_; }
   CacheCounters& cache_counters() { return cache_counters_; }
-  /// Shows the preview and calls the progress hook now and then, unless another thread is at it; sees stop requests.
+  /// Shows the preview, writes the checkpoint and calls the progress hook now and then, unless another thread is at it; sees
+  /// stop requests. A safe point.
   void report_progress();
   /// Adds this worker's counters to the context. Called once, at the end.
   void hand_in();

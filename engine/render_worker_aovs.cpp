@@ -21,12 +21,12 @@ void RenderWorker::note_features(PathState& path, uint32_t bounce, bool goes_on)
     features.position = features.normal = features.albedo = Vec3(0);
     features.distance = 0;
   }
-  if (bounce == 0) {
+  if (bounce == 0 && path.seeks == kSeeksSurface) {
     aovs_->add_first_hit(path.pixel, features);
     if (path.sample == 0) aovs_->set_ids(path.pixel, path.hit, features.material);
   }
-  if (features.see_through && goes_on) return;
-  path.seeks = 0;
+  path.seeks = features.see_through && goes_on ? kSeeksAlbedo : kSeeksNothing;
+  if (path.seeks != kSeeksNothing) return;
   aovs_->add_albedo(path.pixel, features.albedo);
 }
 

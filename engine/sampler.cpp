@@ -70,7 +70,13 @@ uint32_t spread_bits(uint32_t x) {
   return (x | x << 1) & 0x55555555u;
 }
 
+uint32_t bits_for(uint32_t count) { return static_cast<uint32_t>(std::bit_width(std::max(count, 1u) - 1)); }
+
 }  // namespace
+
+uint32_t Sampler::bits_of(uint32_t samples, SampleSets sets) {
+  return bits_for(sets == SampleSets::kHalves ? (samples + 1) / 2 : samples);
+}
 
 Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t width, uint32_t height, uint32_t samples, SampleSets sets)
     : kind_(kind),
@@ -78,8 +84,7 @@ Sampler::Sampler(SamplerKind kind, uint64_t seed, uint32_t width, uint32_t heigh
       width_(std::max(width, 1u)),
       half_bits_(sets == SampleSets::kHalves ? 1 : 0) {
   if (kind != SamplerKind::kBlueNoise) return;
-  const auto bits_for = [](uint32_t count) { return static_cast<uint32_t>(std::bit_width(std::max(count, 1u) - 1)); };
-  sample_bits_ = bits_for((samples + half_bits_) >> half_bits_);
+  sample_bits_ = bits_of(samples, sets);
   tile_levels_ = std::min(bits_for(std::max(width, height)), (31 - sample_bits_) / 2);  // an index has 32 bits
 }
 

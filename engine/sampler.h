@@ -70,6 +70,11 @@ class Sampler {
   Sampler(SamplerKind kind, uint64_t seed, uint32_t width, uint32_t height, uint32_t samples,
           SampleSets sets = SampleSets::kOne);
 
+  /// Whether pictures of so many samples draw the same numbers, as far as both have them.
+  static bool same_numbers(SamplerKind kind, uint32_t samples, uint32_t others, SampleSets sets) {
+    return kind != SamplerKind::kBlueNoise || bits_of(samples, sets) == bits_of(others, sets);
+  }
+
   Random4 draw(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const {
     if (kind_ == SamplerKind::kIndependent) return hash(pixel, sample, bounce, dimension);
     return kind_ == SamplerKind::kSobol ? draw_sobol(pixel, sample, bounce, dimension)
@@ -81,6 +86,8 @@ class Sampler {
   }
 
  private:
+  /// Blue noise: of the samples of one set.
+  static uint32_t bits_of(uint32_t samples, SampleSets sets);
   Random4 draw_sobol(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const;
   Random4 draw_blue_noise(uint32_t pixel, uint32_t sample, uint32_t bounce, Dimension dimension) const;
 

@@ -11,12 +11,13 @@
 
 #include "engine/path_state.h"
 #include "engine/path_ray.h"
+#include "engine/pause_gate.h"
 #include "io/huge_memory.h"
 #include "queues/ray_sorter.h"
 
 namespace shoal {
 
-class SortedPaths {
+class SortedPaths final : public UnfinishedPaths {
  public:
   SortedPaths(const Bounds3& bounds, uint32_t path_count, unsigned threads)
       : sorter(bounds, threads, 2ull * path_count), states_(path_count), rays_(2ull * path_count),
@@ -33,6 +34,10 @@ class SortedPaths {
   PathState& state(uint32_t path) { return states_[path]; }
   uint32_t path_count() const { return path_count_; }
   bool free(uint32_t path) const { return sorter.empty(2ull * path) && sorter.empty(2ull * path + 1); }
+
+  void each_unfinished(const VisitUnfinished& visit) const override {
+    for (uint32_t path = 0; path < path_count_; ++path) visit_unfinished(states_[path], visit);
+  }
 
   /// The ray joins the next wave.
   void put(const Ray& ray) {

@@ -20,7 +20,7 @@ enum class ErrorCode : uint8_t {
   kMemoryCap = 5,    ///< the memory cap cannot work, or memory ran out
   kStorage = 6,      ///< disk full or an I/O error
   kCorrupt = 7,      ///< a .shoal file whose bytes are not what was written
-  /// Stopped by a signal: no output file but the last preview is left; a source being --consumed is already destroyed
+  /// Stopped by a signal: no output file is left but preview and checkpoint; a source being --consumed is already destroyed
   /// in part.
   kStopped = 9,
 };
