@@ -1,6 +1,6 @@
 // Rays through a scene by every way that there is, on every instruction set that this processor and this build have:
 // the queued and the depth-first orders' (TopTree::next and trace_treelets), the scalar reference's, and the hybrid
-// order's (SceneTracer, single rays and packets), and those of treelets/scene_traversal.h and treelets/inner_loops.h. For tests of numerics, where all of them must agree to the bit.
+// order's (SceneTracer, single rays and packets); and on the best of them those of treelets/scene_traversal.h. For tests of numerics, where all of them must agree to the bit.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -83,19 +83,10 @@ inline std::vector<Ray> trace_every_way(const TestScene& scene, const std::vecto
     expect_same_ends(target, "treelet by treelet", expected, trace_one_by_one(tree, scene, rays, kernel));
     expect_same_ends(target, "single rays", expected, trace_together(tree, scene, rays, RayGrouping::kSingle, test));
     expect_same_ends(target, "packets", expected, trace_together(tree, scene, rays, RayGrouping::kPackets, test));
-    for (const InnerLoop loop : {InnerLoop::kWhileWhile, InnerLoop::kIfIf}) {
-      const auto in_lock_step = [&](std::span<const std::byte> page, const TreeletEntry& entry,
-                                    const Instance& instance, Ray& ray) {
-        RayContext context;
-        TraceJob job{page.data(), &ray, &context, &instance, entry};
-        trace_treelets({&job, 1}, counters, test, loop);
-      };
-      expect_same_ends(target, "in lock-step", expected, trace_one_by_one(tree, scene, rays, in_lock_step));
-    }
-    for (const TraversalWay& way : kTraversalWays) {
-      expect_same_ends(target, way.name, expected, trace_by(way, tree, scene, rays, counters, test));
-    }
   });
+  for (const TraversalWay& way : kTraversalWays) {  // scene_traversal_test has them on every instruction set
+    expect_same_ends("the best", way.name, expected, trace_by(way, tree, scene, rays, counters, test));
+  }
   return expected;
 }
 

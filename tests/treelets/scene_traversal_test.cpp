@@ -26,6 +26,20 @@ std::vector<Ray> one_by_one(const Fixture& f, std::vector<Ray> rays) {
   return rays;
 }
 
+/// trace_every_way(), and these ways on every instruction set too. Returns the rays at their ends.
+std::vector<Ray> trace_really_every_way(const TestScene& scene, const std::vector<Ray>& rays,
+                                        TriangleTest test = TriangleTest::kWatertight) {
+  const std::vector<Ray> expected = trace_every_way(scene, rays, test);
+  const TopTree tree(scene.nodes, scene.entries, scene.instances);
+  TraceCounters counters;
+  on_every_instruction_set([&](const char* target) {
+    for (const TraversalWay& way : kTraversalWays) {
+      expect_same_ends(target, way.name, expected, trace_by(way, tree, scene, rays, counters, test));
+    }
+  });
+  return expected;
+}
+
 /// From one place, at points of a square: all signs alike, all enter the same nodes.
 std::vector<Ray> camera_rays(size_t count, bool any_hit = false) {
   std::vector<Ray> rays;
@@ -64,7 +78,7 @@ TEST(SceneTraversal, TakesRaysOfEverySignZerosAndStartsInsideBoxes) {
     rays.push_back(make_ray(random_vector(random, 0.5f), direction, i % 3 == 0 ? 0.7f : kRayInfinity, i % 4 == 0));
   }
   EXPECT_GT(std::count_if(rays.begin(), rays.end(), [](const Ray& r) { return r.any_hit(); }), 200);
-  trace_every_way(f.scene, rays);
+  trace_really_every_way(f.scene, rays);
 }
 
 TEST(SceneTraversal, TakesRaysUnderInstancesByEveryTriangleTest) {
@@ -84,7 +98,7 @@ TEST(SceneTraversal, TakesRaysUnderInstancesByEveryTriangleTest) {
   const std::vector<Ray> alike = camera_rays(400);
   rays.insert(rays.end(), alike.begin(), alike.end());
   for (const TriangleTest test : {TriangleTest::kWatertight, TriangleTest::kFast, TriangleTest::kDouble}) {
-    trace_every_way(scene, rays, test);
+    trace_really_every_way(scene, rays, test);
   }
 }
 
@@ -112,7 +126,7 @@ TEST(SceneTraversal, LetsRaysThroughWhatIsNotThere) {
   turned.object_to_world = {{0.3f, 0.4f, 0}, {-0.4f, 0.3f, 0.1f}, {0, 0, -0.5f}, {0.5f, -0.2f, 0.1f}};
   for (const std::vector<Placement>& placements : {std::vector<Placement>{{0, {}}}, {{0, {}}, turned}}) {
     const TestScene scene = build_scene({soup}, placements, 8u << 10, 0, &half);
-    const std::vector<Ray> found = trace_every_way(scene, rays);
+    const std::vector<Ray> found = trace_really_every_way(scene, rays);
     size_t differ = 0;
     for (size_t i = 0; i < rays.size(); ++i) {
       Ray all = rays[i];
@@ -208,7 +222,7 @@ TEST(InnerLoops, FindTheHitsOfTheMoreNumerousAndLeaveLanesIdle) {
   const auto soup = random_soup(random, 1500, 0.15f);
   const Fixture f(make_scene({soup}, {{0, {}}}, {5000, 5}));  // one treelet
   const std::vector<Ray> rays = awkward_rays(random, soup, 500);
-  for (const TriangleTest test : {TriangleTest::kWatertight, TriangleTest::kFast, TriangleTest::kDouble}) {
+  const auto compare = [&](TriangleTest test) {
     std::vector<std::vector<Ray>> ends;
     std::vector<TraceCounters> counted;
     for (const InnerLoop loop : {InnerLoop::kMoreNumerous, InnerLoop::kWhileWhile, InnerLoop::kIfIf}) {
@@ -233,7 +247,11 @@ TEST(InnerLoops, FindTheHitsOfTheMoreNumerousAndLeaveLanesIdle) {
       EXPECT_LT(counted[loop].simd_active_lanes_count, counted[loop].simd_lanes_count);
     }
     EXPECT_NE(counted[1].simd_lanes_count, counted[2].simd_lanes_count);
-  }
+  };
+  on_every_instruction_set([&](const char* target) {
+    SCOPED_TRACE(target);
+    for (const TriangleTest test : {TriangleTest::kWatertight, TriangleTest::kFast, TriangleTest::kDouble}) compare(test);
+  });
 }
 
 }  // namespace
