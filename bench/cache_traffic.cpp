@@ -31,7 +31,7 @@ struct Arguments {
   std::vector<MemoryOrder> orders{std::begin(kAllOrders), std::end(kAllOrders)};
   QueueChoice choice = QueueChoice::kSweep;
   CacheModel::Options cache;
-  CacheShape inner{.bytes = 0, .ways = 12};
+  CacheShape inner{.bytes = 0, .ways = 12}, outer;
   bool no_prefetches = false, brief = false;
   unsigned only_trace = 0;
 };
@@ -70,11 +70,13 @@ Status check_order(const MemoryScene& scene, const OrderOptions& options, const 
 Result<OrderTraffic> traffic_of(MemoryOrder order, const MemoryScene& scene, const OrderOptions& options,
                                 const RaySet& set, const TrafficRun& run) {
   CacheModel cache(run.cache);
-  TouchMeter meter(cache, run.prefetches);
+  ModelSink sink(cache, run.prefetches);
+  TouchLog log(sink);
   LargeVector<RayAnswer> answers(set.rays.size());
   OrderTraffic traffic;
   traffic.order = order;
-  traffic.counts = touch_order(order, scene, options, set, answers, meter);
+  traffic.counts = touch_order(order, scene, options, set, answers, log);
+  log.flush();
   cache.flush();
   traffic.lines = cache.counts();
   for (uint8_t kind = 0; kind < kDataKindCount; ++kind) traffic.lines_of_kind[kind] = cache.counts(kind);
@@ -171,16 +173,16 @@ void add_scene_options(CLI::App& app, Arguments& arguments) {
 }
 
 void add_cache_options(CLI::App& app, Arguments& arguments) {
-  app.add_option("--l2", arguments.cache.outer.bytes, "size of the cache, such as 2M")
+  app.add_option("--l2", arguments.outer.bytes, "size of the cache, such as 2M")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
-  app.add_option("--ways", arguments.cache.outer.ways, "places of a set")->capture_default_str();
-  app.add_option("--line", arguments.cache.outer.line_bytes, "bytes of a line")->capture_default_str();
+  app.add_option("--ways", arguments.outer.ways, "places of a set")->capture_default_str();
+  app.add_option("--line", arguments.outer.line_bytes, "bytes of a line")->capture_default_str();
   app.add_option("--l1", arguments.inner.bytes, "size of a cache in front of it, such as 48K (default: none)")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--l1-ways", arguments.inner.ways, "its places of a set")->capture_default_str();
   app.add_flag("--no-prefetches", arguments.no_prefetches, "leave out what the kernels ask for ahead of time");
-  app.add_option("--sample", arguments.cache.sample, "model one in so many sets of the cache, a power of two")
+  app.add_option("--sample", arguments.cache.one_in, "model one in so many sets of the cache, a power of two")
       ->capture_default_str();
   app.add_option("--only-trace", arguments.only_trace,
                  "trace so many times by the orders themselves and model nothing: for other programs that count");
@@ -196,11 +198,13 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (arguments.brief) {
     arguments.scene.triangles = 50'000, arguments.rays = 20'000;
-    arguments.cache.outer.bytes = 128u << 10;
+    arguments.outer.bytes = 128u << 10;
   }
   if (arguments.inner.bytes > 0) {
-    arguments.inner.line_bytes = arguments.cache.outer.line_bytes;
-    arguments.cache.inner = arguments.inner;
+    arguments.inner.line_bytes = arguments.outer.line_bytes;
+    arguments.cache.levels = {arguments.inner, arguments.outer};
+  } else {
+    arguments.cache.levels = {arguments.outer};
   }
   Status status = arguments.cache.check();
   if (status.ok()) status = run(arguments);

@@ -1,51 +1,32 @@
-// Tells a cache model which bytes of which data tracing touches. Held by what re-enacts the kernels and the orders
-// (bench/touched_kernels, bench/touched_orders). One thread. Cost: that of the model.
+// What the re-enacted orders (bench/touched_orders) touch goes from their log into a model of the caches. One
+// thread.
 #pragma once
 
-#include "bench/cache_model.h"
+#include "engine/cache_model.h"
+#include "treelets/touch_log.h"
 
 namespace shoal::bench {
 
-enum class DataKind : uint8_t {
-  kTopTree,  ///< nodes, entries, instances, and where each treelet's page begins
-  kNodes,    ///< of treelets, with their headers
-  kLeaves,
-  kRays,     ///< as they are given
-  kAnswers,  ///< as they are handed back
-  kQueues,   ///< blocks of waiting rays, and what stands about them in tables
-  kSorting,  ///< keys and permutations
-  kInHand,   ///< of the rays being traced: themselves, their contexts and stacks
-};
+/// The kinds that orders in memory touch: the first of TouchKind, by shorter names.
 inline constexpr const char* kDataKinds[] = {"top tree", "nodes",  "leaves",  "rays",
                                              "answers",  "queues", "sorting", "in hand"};
 inline constexpr uint8_t kDataKindCount = std::size(kDataKinds);
-static_assert(kDataKindCount == static_cast<uint8_t>(DataKind::kInHand) + 1);
+static_assert(kDataKindCount == static_cast<uint8_t>(TouchKind::kInHand) + 1);
 
-class TouchMeter {
+class ModelSink final : public TouchSink {
  public:
   /// Keeps a reference. Without `prefetches` what the kernels ask for ahead of time is not told.
-  TouchMeter(CacheModel& model, bool prefetches) : model_(model), prefetches_(prefetches) {}
+  ModelSink(CacheModel& model, bool prefetches) : model_(model), prefetches_(prefetches) {}
 
-  void read(const void* at, size_t bytes, DataKind kind) { touch(at, bytes, false, kind); }
-  void write(const void* at, size_t bytes, DataKind kind) { touch(at, bytes, true, kind); }
-  template <class T>
-  void read(const T& value, DataKind kind) {
-    read(&value, sizeof(T), kind);
-  }
-  template <class T>
-  void write(const T& value, DataKind kind) {
-    write(&value, sizeof(T), kind);
-  }
-  /// The line that `at` lies in.
-  void prefetch(const void* at, DataKind kind) {
-    if (prefetches_) touch(at, 1, false, kind);
+  void take(std::span<const Touch> touches) override {
+    for (const Touch& touch : touches) {
+      if (touch.action == TouchAction::kPrefetch && !prefetches_) continue;
+      model_.touch(touch.address, touch.bytes, touch.action == TouchAction::kWrite,
+                   static_cast<uint8_t>(touch.kind));
+    }
   }
 
  private:
-  void touch(const void* at, size_t bytes, bool write, DataKind kind) {
-    model_.touch(reinterpret_cast<uintptr_t>(at), bytes, write, static_cast<uint8_t>(kind));
-  }
-
   CacheModel& model_;
   bool prefetches_;
 };

@@ -1,9 +1,10 @@
-// engine/ray_group over again, with what it touches told to a TouchMeter: the same rays go on together in the same
+// engine/ray_group over again, with what it touches told to a TouchLog: the same rays go on together in the same
 // order. Called by bench/touched_orders. One thread; some 30 KiB.
 #pragma once
 
-#include "bench/touched_kernels.h"
+#include "bench/touch_meter.h"
 #include "engine/ray_group.h"
+#include "treelets/trace_touching.h"
 
 namespace shoal::bench {
 
@@ -11,7 +12,7 @@ class TouchedGroup {
  public:
   static constexpr uint32_t kCapacity = RayGroup::kCapacity;
 
-  explicit TouchedGroup(TouchMeter& meter) : meter_(meter) {
+  explicit TouchedGroup(TouchLog& log) : log_(log) {
     for (uint32_t i = 0; i < kCapacity; ++i) slot_[i] = static_cast<uint8_t>(i);
   }
   uint32_t size() const { return size_; }
@@ -25,9 +26,9 @@ class TouchedGroup {
     member.page = page;
     member.traced = false;
     member.node_tests = member.triangle_tests = 0;
-    meter_.write(member.ray, DataKind::kInHand);
-    meter_.write(member.context.object_instance, DataKind::kInHand);
-    meter_.write(member.page, DataKind::kInHand);
+    log_.write(member.ray, TouchKind::kInHand);
+    log_.write(member.context.object_instance, TouchKind::kInHand);
+    log_.write(member.page, TouchKind::kInHand);
   }
 
   /// As RayGroup::step(), with `decide(member, treelet)`.
@@ -38,10 +39,10 @@ class TouchedGroup {
     for (uint32_t i = 0; i < size_; ++i) {
       const uint8_t slot = slot_[i];
       GroupRay& member = rays_[slot];
-      meter_.write(member.page, DataKind::kInHand);
+      log_.write(member.page, TouchKind::kInHand);
       if (member.page == nullptr) {
         const uint32_t entry = entry_[slot];
-        if (entry != kNoIndex) meter_.read(tree.entry(entry), DataKind::kTopTree);
+        if (entry != kNoIndex) log_.read(tree.entry(entry), TouchKind::kTopTree);
         member.page = decide(member, entry == kNoIndex ? kNoIndex : tree.entry(entry).treelet);
         if (member.page == nullptr) continue;
       }
@@ -56,7 +57,7 @@ class TouchedGroup {
   void address(const TopTree& tree);
   void trace(const TopTree& tree, TraceCounters& counters);
 
-  TouchMeter& meter_;
+  TouchLog& log_;
   uint32_t size_ = 0;
   uint8_t slot_[kCapacity];
   uint32_t entry_[kCapacity];

@@ -1,4 +1,4 @@
-// bench/queued_memory_order over again on one thread, with what it touches told to a TouchMeter. The same treelets are
+// bench/queued_memory_order over again on one thread, with what it touches told to a TouchLog. The same treelets are
 // drained in the same order, and blocks are taken and given back in the same order: so they lie in cache, or not, as
 // they do there.
 #include "bench/touched_orders.h"
@@ -24,18 +24,18 @@ struct FullBlocks {
 /// Blocks that are free: a thread's own, and those of the store behind it.
 class FreeBlocks {
  public:
-  explicit FreeBlocks(TouchMeter& meter) : meter_(meter) {}
+  explicit FreeBlocks(TouchLog& log) : log_(log) {}
 
   uint32_t take() {
     if (own_.empty()) refill();
     const uint32_t block = own_.back();
-    meter_.read(own_.back(), DataKind::kQueues);
+    log_.read(own_.back(), TouchKind::kQueues);
     own_.pop_back();
     return block;
   }
   void give_back(uint32_t block) {
     own_.push_back(block);
-    meter_.write(own_.back(), DataKind::kQueues);
+    log_.write(own_.back(), TouchKind::kQueues);
     if (own_.size() >= 2 * kChainBlocks) move_chain(own_, spare_);
   }
 
@@ -43,16 +43,16 @@ class FreeBlocks {
   void refill() {
     if (!spare_.empty()) return move_chain(spare_, own_);
     for (size_t i = 0; i < kChainBlocks; ++i) own_.push_back(used_++);
-    meter_.write(own_.data(), kChainBlocks * sizeof(uint32_t), DataKind::kQueues);
+    log_.write(own_.data(), kChainBlocks * sizeof(uint32_t), TouchKind::kQueues);
   }
   void move_chain(std::vector<uint32_t>& from, std::vector<uint32_t>& to) {
     to.insert(to.end(), from.end() - kChainBlocks, from.end());
-    meter_.read(from.data() + from.size() - kChainBlocks, kChainBlocks * sizeof(uint32_t), DataKind::kQueues);
-    meter_.write(to.data() + to.size() - kChainBlocks, kChainBlocks * sizeof(uint32_t), DataKind::kQueues);
+    log_.read(from.data() + from.size() - kChainBlocks, kChainBlocks * sizeof(uint32_t), TouchKind::kQueues);
+    log_.write(to.data() + to.size() - kChainBlocks, kChainBlocks * sizeof(uint32_t), TouchKind::kQueues);
     from.resize(from.size() - kChainBlocks);
   }
 
-  TouchMeter& meter_;
+  TouchLog& log_;
   std::vector<uint32_t> own_, spare_;
   uint32_t used_ = 0;
 };
@@ -60,10 +60,10 @@ class FreeBlocks {
 class TouchedQueued {
  public:
   TouchedQueued(const MemoryScene& scene, const OrderOptions& options, const RaySet& set, std::span<RayAnswer> answers,
-                uint64_t in_flight_limit, uint64_t blocks, TouchMeter& meter)
+                uint64_t in_flight_limit, uint64_t blocks, TouchLog& log)
       : scene_(scene), choice_(options.choice), set_(set), answers_(answers), in_flight_limit_(in_flight_limit),
-        meter_(meter), blocks_(blocks), next_(blocks), full_(scene.pages.size()), open_(scene.pages.size()),
-        free_(meter), group_(meter) {}
+        log_(log), blocks_(blocks), next_(blocks), full_(scene.pages.size()), open_(scene.pages.size()),
+        free_(log), group_(log) {}
 
   TraceCounts run() {
     while (next_ray_ < set_.rays.size() || in_flight_ > 0) {
@@ -85,7 +85,7 @@ class TouchedQueued {
     next_ray_ = last;
     travel(kNoIndex, [&] {
       if (i == last) return false;
-      group_.add(begin_touching(set_, i++, meter_), nullptr);
+      group_.add(begin_touching(set_, i++, log_), nullptr);
       return true;
     });
     return true;
@@ -97,8 +97,8 @@ class TouchedQueued {
     TreeletId best = kNoIndex;
     for (uint32_t step = 0; step < count; ++step) {
       cursor_ = cursor_ + 1 < count ? cursor_ + 1 : 0;
-      meter_.read(full_[cursor_], DataKind::kQueues);
-      meter_.read(open_[cursor_], DataKind::kQueues);
+      log_.read(full_[cursor_], TouchKind::kQueues);
+      log_.read(open_[cursor_], TouchKind::kQueues);
       const uint64_t rays = uint64_t{kBlockRays} * full_[cursor_].blocks + open_[cursor_].count;
       if (rays > most) most = rays, best = cursor_;
       if (rays > 0 && choice_ == QueueChoice::kSweep) break;
@@ -109,17 +109,17 @@ class TouchedQueued {
   void drain(TreeletId treelet) {
     ++counts_.drains;
     FullBlocks& queue = full_[treelet];
-    meter_.write(queue, DataKind::kQueues);
-    meter_.write(open_[treelet], DataKind::kQueues);
+    log_.write(queue, TouchKind::kQueues);
+    log_.write(open_[treelet], TouchKind::kQueues);
     uint32_t block = std::exchange(queue.head, kNoIndex);
     const OpenBlock own = std::exchange(open_[treelet], {});
     uint32_t count = kBlockRays, next = 0;
     if (block == kNoIndex) block = own.block, count = own.count;
-    const std::byte* page = page_touching(scene_, treelet, meter_);
+    const std::byte* page = page_touching(scene_, treelet, log_);
     travel(treelet, [&] {
       if (block == kNoIndex) return false;
       const Ray& ray = blocks_[block].rays[next++];
-      meter_.read(ray, DataKind::kQueues);
+      log_.read(ray, TouchKind::kQueues);
       group_.add(ray, page);
       if (next < count) return true;
       const uint32_t used = block;
@@ -127,10 +127,10 @@ class TouchedQueued {
       if (block == own.block) {
         block = kNoIndex;
       } else {
-        meter_.read(next_[used], DataKind::kQueues);
+        log_.read(next_[used], TouchKind::kQueues);
         block = next_[used];
         --queue.blocks;
-        meter_.write(queue, DataKind::kQueues);
+        log_.write(queue, TouchKind::kQueues);
         if (block == kNoIndex) block = own.block, count = own.count;
       }
       free_.give_back(used);
@@ -147,7 +147,7 @@ class TouchedQueued {
       if (treelet != kNoIndex) {
         push(treelet, member.ray);
       } else {
-        answer_touching(member.ray, answers_, meter_);
+        answer_touching(member.ray, answers_, log_);
         --in_flight_;
       }
       return nullptr;
@@ -162,17 +162,17 @@ class TouchedQueued {
 
   void push(TreeletId treelet, const Ray& ray) {
     OpenBlock& open = open_[treelet];
-    meter_.write(open, DataKind::kQueues);
+    log_.write(open, TouchKind::kQueues);
     if (open.block == kNoIndex) open.block = free_.take();
     Ray& place = blocks_[open.block].rays[open.count++];
     place = ray;
-    meter_.write(place, DataKind::kQueues);
+    log_.write(place, TouchKind::kQueues);
     if (open.count < kBlockRays) return;
     FullBlocks& queue = full_[treelet];
     next_[open.block] = std::exchange(queue.head, open.block);
     ++queue.blocks;
-    meter_.write(queue, DataKind::kQueues);
-    meter_.write(next_[open.block], DataKind::kQueues);
+    log_.write(queue, TouchKind::kQueues);
+    log_.write(next_[open.block], TouchKind::kQueues);
     open = {};
   }
 
@@ -181,7 +181,7 @@ class TouchedQueued {
   const RaySet& set_;
   std::span<RayAnswer> answers_;
   const uint64_t in_flight_limit_;
-  TouchMeter& meter_;
+  TouchLog& log_;
   HugeArray<Block> blocks_;
   std::vector<uint32_t> next_;  ///< of a block in a list
   std::vector<FullBlocks> full_;
@@ -197,13 +197,13 @@ class TouchedQueued {
 }  // namespace
 
 TraceCounts touch_queued_order(const MemoryScene& scene, const OrderOptions& options, const RaySet& set,
-                               std::span<RayAnswer> answers, TouchMeter& meter) {
+                               std::span<RayAnswer> answers, TouchLog& log) {
   // Limit and blocks as make_queued_order() has them.
   const uint64_t count = set.rays.size();
   const uint64_t in_flight = std::max(std::min(options.in_flight, count + kRaysPerGrab), kRaysPerGrab);
   const uint64_t blocks =
       (in_flight + kRaysPerGrab) / kBlockRays + scene.pages.size() + 1 + 4 * kChainBlocks;
-  return std::make_unique<TouchedQueued>(scene, options, set, answers, in_flight, blocks, meter)->run();
+  return std::make_unique<TouchedQueued>(scene, options, set, answers, in_flight, blocks, log)->run();
 }
 
 }  // namespace shoal::bench

@@ -33,17 +33,17 @@ class SortKey {
 
 }  // namespace
 
-TouchedSort::TouchedSort(const Bounds3& bounds, const LargeVector<BenchRay>& rays, TouchMeter& meter)
+TouchedSort::TouchedSort(const Bounds3& bounds, const LargeVector<BenchRay>& rays, TouchLog& log)
     : count_(rays.size()), items_(rays.size()), sorted_(rays.size()) {
   const SortKey key(bounds);
-  for (uint64_t i = 0; i < count_; ++i) meter.write(items_[i], DataKind::kSorting);  // emptied first
+  for (uint64_t i = 0; i < count_; ++i) log.write(items_[i], TouchKind::kSorting);  // emptied first
   for (uint64_t i = 0; i < count_; ++i) {
-    meter.read(rays[i], DataKind::kRays);
+    log.read(rays[i], TouchKind::kGivenRays);
     items_[i] = key.of(rays[i]) << kSlotBits | i;
-    meter.write(items_[i], DataKind::kSorting);
+    log.write(items_[i], TouchKind::kSorting);
   }
   for (uint32_t i = 0; i < RaySorter::kPasses; ++i) {
-    pass(i % 2 == 0 ? items_ : sorted_, i % 2 == 0 ? sorted_ : items_, kSlotBits + i * kDigitBits, meter);
+    pass(i % 2 == 0 ? items_ : sorted_, i % 2 == 0 ? sorted_ : items_, kSlotBits + i * kDigitBits, log);
   }
   TeamSorter sorter(bounds, 1, count_);
   sorter.sort(rays, 0);
@@ -55,20 +55,20 @@ uint32_t TouchedSort::slot_at(uint64_t place) const {
 }
 
 void TouchedSort::pass(const HugeArray<uint64_t>& from, const HugeArray<uint64_t>& to, uint32_t shift,
-                       TouchMeter& meter) {
+                       TouchLog& log) {
   std::vector<uint32_t> digits(kDigits), places(kDigits);
   for (uint64_t i = 0; i < count_; ++i) {
     uint32_t& digit = digits[from[i] >> shift & (kDigits - 1)];
     ++digit;
-    meter.read(from[i], DataKind::kSorting);
-    meter.write(digit, DataKind::kSorting);
+    log.read(from[i], TouchKind::kSorting);
+    log.write(digit, TouchKind::kSorting);
   }
   for (uint32_t digit = 0, next = 0; digit < kDigits; next += digits[digit++]) places[digit] = next;
   for (uint64_t i = 0; i < count_; ++i) {
     uint32_t& place = places[from[i] >> shift & (kDigits - 1)];
-    meter.read(from[i], DataKind::kSorting);
-    meter.write(place, DataKind::kSorting);
-    meter.write(to[place], DataKind::kSorting);
+    log.read(from[i], TouchKind::kSorting);
+    log.write(place, TouchKind::kSorting);
+    log.write(to[place], TouchKind::kSorting);
     to[place++] = from[i];
   }
 }

@@ -30,9 +30,9 @@ void print_run(const TrafficRun& run) {
   fmt::print("{}: {} triangles, {} treelets, {:.1f} MB; {} rays of {}, at most {} waiting in queues; one thread\n",
              run.scene, run.triangles, run.treelets, static_cast<double>(run.scene_bytes) / 1e6, run.rays, run.workload,
              run.in_flight);
-  fmt::print("L2 of {}", describe(run.cache.outer));
-  if (run.cache.inner.has_value()) fmt::print(", behind an L1 of {}", describe(*run.cache.inner));
-  if (run.cache.sample > 1) fmt::print("; one in {} sets is modelled", run.cache.sample);
+  fmt::print("L2 of {}", describe(run.cache.levels.back()));
+  if (run.cache.levels.size() > 1) fmt::print(", behind an L1 of {}", describe(run.cache.levels[0]));
+  if (run.cache.one_in > 1) fmt::print("; one in {} sets is modelled", run.cache.one_in);
   fmt::print("; {} the kernels' prefetches\n\n", run.prefetches ? "with" : "without");
   fmt::print("{:<11} {:>21} {:>10} {:>7} {:>6} | {:<75} | {:^31} |\n", "", "lines", "MB", "bytes/", "over",
              "bytes a ray, fills and write-backs", "a ray");
@@ -44,12 +44,12 @@ void print_run(const TrafficRun& run) {
 
 void print_newest(const TrafficRun& run, const std::vector<OrderTraffic>& orders) {
   const OrderTraffic& order = orders.back();
-  const uint64_t bytes = order.lines.total() * run.cache.outer.line_bytes;
+  const uint64_t bytes = order.lines.total() * run.cache.levels.back().line_bytes;
   fmt::print("{:<11} {:>10} {:>10} {:>10.1f} {:>7.1f} {:>6.3f} |", name_of(order.order), order.lines.fills,
              order.lines.write_backs, static_cast<double>(bytes) / 1e6, per(bytes, run.rays),
              per(order.lines.total(), orders.front().lines.total()));
   for (const LineCounts& lines : order.lines_of_kind) {
-    fmt::print(" {:>8.1f}", per(lines.total() * run.cache.outer.line_bytes, run.rays));
+    fmt::print(" {:>8.1f}", per(lines.total() * run.cache.levels.back().line_bytes, run.rays));
   }
   fmt::print("    | {:>7.2f} {:>9.2f} {:>9.3f}    | {:>7}\n", per(order.counts.node_tests, run.rays),
              per(order.counts.triangle_tests, run.rays), per(order.counts.treelet_visits, run.rays),
@@ -61,17 +61,17 @@ nlohmann::ordered_json to_json(const TrafficRun& run, const std::vector<OrderTra
   nlohmann::ordered_json json = {
       {"scene", run.scene},           {"triangles_count", run.triangles}, {"treelets_count", run.treelets},
       {"scene_bytes", run.scene_bytes}, {"workload", run.workload},         {"rays_count", run.rays},
-      {"in_flight_count", run.in_flight}, {"prefetches", run.prefetches},     {"sampled_sets_one_in", run.cache.sample},
-      {"l2", to_json(run.cache.outer)}};
-  json["l1"] = run.cache.inner.has_value() ? to_json(*run.cache.inner) : nlohmann::ordered_json();
+      {"in_flight_count", run.in_flight}, {"prefetches", run.prefetches},     {"sampled_sets_one_in", run.cache.one_in},
+      {"l2", to_json(run.cache.levels.back())}};
+  json["l1"] = run.cache.levels.size() > 1 ? to_json(run.cache.levels[0]) : nlohmann::ordered_json();
   for (const OrderTraffic& order : orders) {
     nlohmann::ordered_json row = {{"order", name_of(order.order)},
-                                  {"moved_bytes", order.lines.total() * run.cache.outer.line_bytes}};
-    row.update(to_json(order.lines, run.cache.outer.line_bytes));
-    row["bytes_per_ray"] = per(order.lines.total() * run.cache.outer.line_bytes, run.rays);
+                                  {"moved_bytes", order.lines.total() * run.cache.levels.back().line_bytes}};
+    row.update(to_json(order.lines, run.cache.levels.back().line_bytes));
+    row["bytes_per_ray"] = per(order.lines.total() * run.cache.levels.back().line_bytes, run.rays);
     row["over_first"] = per(order.lines.total(), orders.front().lines.total());
     for (uint8_t kind = 0; kind < kDataKindCount; ++kind) {
-      row["kinds"][kDataKinds[kind]] = to_json(order.lines_of_kind[kind], run.cache.outer.line_bytes);
+      row["kinds"][kDataKinds[kind]] = to_json(order.lines_of_kind[kind], run.cache.levels.back().line_bytes);
     }
     row["node_tests_count"] = order.counts.node_tests;
     row["triangle_tests_count"] = order.counts.triangle_tests;

@@ -13,6 +13,7 @@
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/compare_kinds.h"
+#include "bins/compare_levels.h"
 #include "bins/order_choice.h"
 #include "bins/render_options.h"
 #include "engine/render_report.h"
@@ -26,12 +27,15 @@ struct Arguments {
   std::string out;
   uint32_t runs = 1;
   KindArguments kinds;
+  LevelArguments levels;
 };
 
 struct OrderResult {
   std::string label;
   ExecutionOptions execution;
   std::vector<RenderResult> runs;  ///< without pictures
+  std::vector<HardwareCounts> hardware{};  ///< of each run
+  LevelFigures levels{};
 
   /// The run that took the median time; of an even number, the faster of the two in the middle.
   const RenderResult& median() const {
@@ -54,9 +58,17 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 /// The orders take turns, so that what else the machine does disturbs all alike. Of the pictures only the first is kept.
-Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& prepared, Console& console) {
+Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& prepared, const HardwareCounters& hardware,
+                                 Console& console) {
   Comparison comparison;
   std::vector<float> first;
+  const auto compare_picture = [&](std::vector<float> picture) {
+    if (first.empty()) {
+      first = std::move(picture);
+    } else {
+      comparison.identical = comparison.identical && same_bits(picture, first);
+    }
+  };
   SHOAL_ASSIGN_OR_RETURN(const std::vector<OrderChoice> choices, parse_order_choices(arguments.orders));
   for (const OrderChoice& choice : choices) {
     comparison.orders.push_back({choice.label, prepared.execution, {}});
@@ -66,17 +78,25 @@ Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& pre
     for (OrderResult& order : comparison.orders) {
       RenderHooks hooks = console_hooks(console);
       hooks.planned = [&](const MemoryPlan& plan) { console.info(order.label + ": " + describe_plan(plan)); };
+      const HardwareCounts before = hardware.read();
       auto result = render(posix_file_system(), prepared.scene, prepared.picture, order.execution, hooks);
+      order.hardware.push_back(difference(hardware.read(), before));
       console.end_progress();
       if (!result.ok()) return std::move(result).error();
-      std::vector<float> picture = std::exchange(result.value().rgba, {});
-      if (first.empty()) {
-        first = std::move(picture);
-      } else {
-        comparison.identical = comparison.identical && same_bits(picture, first);
-      }
+      compare_picture(std::exchange(result.value().rgba, {}));
       order.runs.push_back(std::move(result).value());
     }
+  }
+  for (OrderResult& order : comparison.orders) {
+    const RenderResult& shown = order.median();
+    order.levels.title = order_name(order.execution.order);
+    order.levels.rays = shown.counters.total().rays_traced_count;
+    order.levels.hardware_available = hardware.available();
+    order.levels.hardware_reason = hardware.reason();
+    order.levels.hardware = order.hardware[static_cast<size_t>(&shown - order.runs.data())];
+    SHOAL_ASSIGN_OR_RETURN(std::vector<float> picture, model_order(arguments.levels, prepared, order.execution, console,
+                                                                   order.levels));
+    if (!picture.empty()) compare_picture(std::move(picture));
   }
   return comparison;
 }
@@ -85,6 +105,7 @@ Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& pre
 Status check_arguments(const Arguments& arguments) {
   SHOAL_RETURN_IF_ERROR(parse_order_choices(arguments.orders));
   if (auto kinds = parse_kinds(arguments.kinds, arguments.runs); !kinds.ok()) return std::move(kinds).error();
+  SHOAL_RETURN_IF_ERROR(arguments.levels.options());
   std::error_code code;
   std::filesystem::create_directories(arguments.out, code);
   if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", arguments.out, code.message())};
@@ -105,6 +126,7 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
     auto& stats = json["orders"][order.label];
     stats = nlohmann::ordered_json::parse(
         stats_json(order.median(), prepared.scene, prepared.picture, order.execution));
+    stats.update(nlohmann::ordered_json::parse(levels_json(order.levels)));
     for (const RenderResult& run : order.runs) stats["run_seconds"].push_back(run.seconds);
   }
   if (kinds) {
@@ -117,10 +139,12 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
 
 int run_compare(const Arguments& arguments, Console& console) {
   if (const Status status = check_arguments(arguments); !status.ok()) return console.error(status.error());
+  const HardwareCounters hardware;  // before the first thread is started
   std::vector<Order> orders;
   const std::vector<OrderChoice> choices = parse_order_choices(arguments.orders).value();
   for (const OrderChoice& choice : choices) orders.push_back(choice.order);
-  auto prepared = prepare_render(arguments.render, orders, orders.size() * arguments.runs > 1 ? 1 : 0, console);
+  const size_t renders = orders.size() * (arguments.runs + (arguments.levels.model ? 1 : 0));
+  auto prepared = prepare_render(arguments.render, orders, renders > 1 ? 1 : 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   std::optional<KindOptions> kinds_asked;
   if (arguments.kinds.asked()) {
@@ -128,7 +152,7 @@ int run_compare(const Arguments& arguments, Console& console) {
     const Status fits = check_kinds(prepared.value(), choices, *kinds_asked);
     if (!fits.ok()) return console.error(fits.error());
   }
-  const auto compared = render_orders(arguments, prepared.value(), console);
+  const auto compared = render_orders(arguments, prepared.value(), hardware, console);
   if (!compared.ok()) return console.error(compared.error());
   const Comparison& comparison = compared.value();
   std::vector<TrafficColumn> columns;
@@ -143,7 +167,9 @@ int run_compare(const Arguments& arguments, Console& console) {
   }
   const Status written = write_report(arguments, prepared.value(), comparison, kinds);
   if (!written.ok()) return console.error(written.error());
-  fmt::print("{}", traffic_table(columns));
+  std::vector<LevelFigures> levels;
+  for (const OrderResult& order : comparison.orders) levels.push_back(order.levels);
+  fmt::print("{}{}", traffic_table(columns), levels_table(levels));
   fmt::print("{:<34}{:>16}\n", "pictures", comparison.identical ? "identical" : "DIFFERENT");
   if (kinds) fmt::print("{}", kinds_text(*kinds));
   if (!comparison.identical) {
@@ -170,6 +196,7 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   arguments->kinds.declare(*sub);
+  arguments->levels.declare(*sub);
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_compare(*arguments, console); };
   });

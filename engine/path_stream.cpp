@@ -19,7 +19,8 @@ class PathStream final : public RayStream, public UnfinishedPaths {
         worker_(context, thread),
         paths_(context.scene.treelets.size(), StreamedPaths::paths_of(order)),
         samples_per_grab_(paths_.capacity / 4),
-        traversal_(make(context.scene.top_tree, paths_.pages.data(), context.picture.shading.triangle_test)) {}
+        traversal_(make(context.scene.top_tree, paths_.pages.data(), context.picture.shading.triangle_test,
+                        worker_.touches())) {}
 
   void run() {
     const PauseGate::Member member(context_.gate);
@@ -121,6 +122,7 @@ class PathStream final : public RayStream, public UnfinishedPaths {
     for (uint32_t i = 0; i < count; ++i) {
       const uint32_t index = 2 * path + (rays[i].any_hit() ? 1 : 0);
       paths_.rays[index] = rays[i];
+      worker_.touch_waiting(&paths_.rays[index], TouchAction::kWrite);
       paths_.ready.push_back(index);
     }
     if (count > 0) return;
@@ -135,6 +137,7 @@ class PathStream final : public RayStream, public UnfinishedPaths {
       const uint32_t path = paths_.free.back();
       paths_.free.pop_back();
       paths_.rays[2 * path] = worker_.begin_path(sample, path, paths_.states[path]);
+      worker_.touch_waiting(&paths_.rays[2 * path], TouchAction::kWrite);
       paths_.ready.push_back(2 * path);
     }
     return samples.size() > 0;

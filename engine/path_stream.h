@@ -13,7 +13,9 @@
 
 namespace shoal {
 
-using MakeTraversal = std::function<std::unique_ptr<SceneTraversal>(const TopTree&, PageTable, TriangleTest)>;
+/// The last: what tells what is touched, or none; kernels that cannot tell leave it alone.
+using MakeTraversal =
+    std::function<std::unique_ptr<SceneTraversal>(const TopTree&, PageTable, TriangleTest, TouchLog*)>;
 
 /// Returns when every sample is in the film or context.ended is set. Requires: a cache with room for every page.
 void render_streamed(RenderContext& context, Order order, const MakeTraversal& make);

@@ -1,8 +1,10 @@
 #include "engine/ray_group.h"
 
+#include "treelets/trace_touching.h"
+
 namespace shoal {
 
-void RayGroup::address(const TopTree& tree) {
+void RayGroup::address(const TopTree& tree, TouchLog* touches) {
   NextJob jobs[kCapacity];
   uint8_t slots[kCapacity];
   uint32_t count = 0;
@@ -14,21 +16,34 @@ void RayGroup::address(const TopTree& tree) {
     jobs[count] = {&member.ray, &member.context};
     slots[count++] = slot_[i];
   }
-  tree.next({jobs, count});
+  if (touches == nullptr) {
+    tree.next({jobs, count});
+  } else {
+    next_entries_touching(tree, {jobs, count}, *touches);
+  }
   for (uint32_t k = 0; k < count; ++k) {
     entry_[slots[k]] = jobs[k].entry;
     rays_[slots[k]].node_tests += jobs[k].node_tests;
   }
 }
 
-uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
+uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleTest test, InnerLoop loop,
+                         TouchLog* touches) {
   TraceJob jobs[kCapacity];
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];
+    if (touches != nullptr) {
+      touches->read(tree.nodes()[member.ray.cursor >> 3].child[member.ray.cursor & 7], TouchKind::kTopTree);
+      touches->read(tree.current(member.ray), TouchKind::kTopTree);
+    }
     jobs[i] = {member.page, &member.ray, &member.context, &tree.instance(member.ray.instance),
                tree.current(member.ray)};
   }
-  trace_treelets({jobs, size_}, counters, test, loop);
+  if (touches == nullptr) {
+    trace_treelets({jobs, size_}, counters, test, loop);
+  } else {
+    trace_treelets_touching({jobs, size_}, counters, *touches);
+  }
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];
     member.node_tests += jobs[i].node_tests;

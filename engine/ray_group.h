@@ -13,6 +13,8 @@
 
 namespace shoal {
 
+class TouchLog;
+
 struct GroupRay {
   Ray ray;
   RayContext context;
@@ -65,7 +67,7 @@ class RayGroup {
   }
 
   /// Finds the next entry of every ray that stands on none.
-  void address(const TopTree& tree);
+  void address(const TopTree& tree, TouchLog* touches = nullptr);
   /// `decide(slot, member, treelet)` is told where a ray that was addressed wants to go (kNoIndex: its answer is known)
   /// and returns the treelet's page to trace it there now, or nothing: the ray has left.
   template <class Decide>
@@ -84,8 +86,9 @@ class RayGroup {
     size_ = kept;
   }
   /// Traces every ray through the treelet that it stands on. Returns their number.
+  /// `touches`: told what is touched, here and in address(); only by TriangleTest::kWatertight and InnerLoop::kMoreNumerous.
   uint32_t trace(const TopTree& tree, TraceCounters& counters, TriangleTest test,
-                 InnerLoop loop = InnerLoop::kMoreNumerous);
+                 InnerLoop loop = InnerLoop::kMoreNumerous, TouchLog* touches = nullptr);
 
  private:
   uint32_t size_;

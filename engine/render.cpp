@@ -278,6 +278,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   if (preview) context.preview = &*preview;
   context.aovs = sums.aovs.get();
   context.adaptive = sums.all().adaptive;
+  context.touches = execution.touches;
   if (earlier != nullptr) SHOAL_RETURN_IF_ERROR(resume_cursor(*earlier, context));
   beginning.earlier.reset();
   SumsHeader header = sums_header(picture, SumsKind::kCheckpoint);

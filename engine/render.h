@@ -29,6 +29,8 @@
 
 namespace shoal {
 
+class TouchRecorder;
+
 struct PictureOptions {
   uint32_t width = 512, height = 512;
   uint32_t samples = 16;  ///< with a target for noise: at most
@@ -89,6 +91,7 @@ struct ExecutionOptions {
   std::string policy = "resident-first";
   PolicyOptions policy_options;
   uint32_t packet_rays = 64;        ///< kPacket, kPacketReorder: rays of a packet, a power of two from 16 to 256
+  TouchRecorder* touches = nullptr;  ///< for measuring: told what every thread touches (engine/touch_recorder.h)
   const MappedPages* mapped_pages = nullptr;  ///< for measuring depth-first: serves all pages, not the page cache
   PagingOptions paging;             ///< queued only: depth-first reads what it needs when it needs it
   PreviewOptions preview;

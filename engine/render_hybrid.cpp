@@ -7,19 +7,20 @@ namespace {
 
 class HybridTraversal final : public SceneTraversal {
  public:
-  HybridTraversal(const TopTree& tree, PageTable pages, TriangleTest test)
-      : tracer_(tree, pages, RayGrouping::kAuto, test) {}
-  void trace(RayStream& stream, TraceCounters& counters) override { tracer_.trace(stream, counters); }
+  HybridTraversal(const TopTree& tree, PageTable pages, TriangleTest test, TouchLog* touches)
+      : tracer_(tree, pages, RayGrouping::kAuto, test), touches_(touches) {}
+  void trace(RayStream& stream, TraceCounters& counters) override { tracer_.trace(stream, counters, touches_); }
 
  private:
   SceneTracer tracer_;
+  TouchLog* touches_;
 };
 
 }  // namespace
 
 void render_hybrid(RenderContext& context) {
-  render_streamed(context, Order::kHybrid, [](const TopTree& tree, PageTable pages, TriangleTest test) {
-    return std::make_unique<HybridTraversal>(tree, pages, test);
+  render_streamed(context, Order::kHybrid, [](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog* touches) {
+    return std::make_unique<HybridTraversal>(tree, pages, test, touches);
   });
 }
 

@@ -4,7 +4,7 @@
 namespace shoal {
 
 void render_packet(RenderContext& context) {
-  render_streamed(context, Order::kPacket, [&](const TopTree& tree, PageTable pages, TriangleTest test) {
+  render_streamed(context, Order::kPacket, [&](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog*) {
     return make_packet_traversal(tree, pages, test, context.packet_rays);
   });
 }

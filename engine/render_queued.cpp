@@ -29,7 +29,7 @@ class QueuedWorker final : public UnfinishedPaths {
         batches_(batches),
         worker_(context, thread),
         admit_batch_(std::clamp(paths.path_count() / 8, 1u, kMaxAdmitBatch)),
-        outbox_(paths.rays),
+        outbox_(paths.rays, worker_.touches()),
         ended_(paths) {}
 
   void run() {
@@ -109,16 +109,24 @@ class QueuedWorker final : public UnfinishedPaths {
       }
       worker_.enter(Phase::kQueue);
       if (next == count) {
+        if (worker_.touches() != nullptr) [[unlikely]] touch_block(batch.next_rays());
         next = 0, count = batch.next_block(block_);
         if (count == 0) return false;
         worker_.counters().ray_moved_bytes += count * sizeof(Ray);
       }
       const Ray& ray = block_.rays[next++];
+      worker_.touch_waiting(&ray, TouchAction::kRead);
       ++worker_.ray_counters(ray).rays_drained_count;
       group_.add(ray, worker_.page_in_hand());
       return true;
     });
     worker_.let_go();
+  }
+
+  /// Rays are copied from their block to this thread's.
+  void touch_block(std::span<const Ray> rays) {
+    worker_.touches()->read(rays.data(), rays.size_bytes(), TouchKind::kQueues);
+    worker_.touches()->write(block_.rays, rays.size_bytes(), TouchKind::kQueues);
   }
 
   /// For the cost map: pages that were read for the treelet in hand are shared by all that waited for it.

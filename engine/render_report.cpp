@@ -375,6 +375,10 @@ std::string traffic_table(const std::vector<TrafficColumn>& columns) {
   row("read from disk", [](R, C c, T) { return format_bytes(c.disk_read_bytes); });
   row("disk reads", [](R, C c, T) { return fmt::format("{}", c.disk_reads_count); });
   row("treelet loads from disk", [](R, C c, T) { return fmt::format("{}", c.treelet_loads_count); });
+  row("rays a treelet load", [](R, C c, T t) {
+    return fmt::format("{:.1f}", ratio(t.rays_traced_count, c.treelet_loads_count));
+  });
+  row("page bytes decoded", [](R, C c, T) { return format_bytes(c.decoded_bytes); });
   row("bytes from disk a ray", [](R, C c, T t) {
     return fmt::format("{:.1f}", ratio(c.disk_read_bytes, t.rays_traced_count));
   });

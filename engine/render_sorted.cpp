@@ -72,12 +72,13 @@ class SortedWorker {
   }
 
   void hand_in() { worker_.hand_in(); }
+  TouchLog* touches() { return worker_.touches(); }
 
  private:
   void put(const Ray& ray) {
     worker_.enter(Phase::kQueue);
     worker_.counters().ray_moved_bytes += sizeof(Ray);
-    paths_.put(ray);
+    paths_.put(ray, worker_.touches());
   }
 
   /// The next ray of the wave joins the group; false: there is none.
@@ -94,7 +95,9 @@ class SortedWorker {
     worker_.enter(Phase::kQueue);
     if (place_ + kFetchAhead < count_) paths_.prefetch(place_ + kFetchAhead);
     worker_.counters().ray_moved_bytes += sizeof(Ray);
-    group_.add(paths_.ray_at(place_++), nullptr);
+    const Ray& ray = paths_.ray_at(place_++, worker_.touches());
+    worker_.touch_waiting(&ray, TouchAction::kRead);
+    group_.add(ray, nullptr);
     return true;
   }
 
@@ -169,10 +172,10 @@ void render_sorted(RenderContext& context, SortedPaths& paths) {
     workers.push_back(std::make_unique<SortedWorker>(context, t, paths, next_place));
   }
   const auto together = [&](const std::function<void(unsigned)>& step) { run_on_threads(context, step); };
-  const auto sort = [&](const std::function<void(unsigned)>& step) {
+  const auto sort = [&](const std::function<void(unsigned, TouchLog*)>& step) {
     together([&](unsigned t) {
       context.phases[t].enter(Phase::kQueue);
-      step(t);
+      step(t, workers[t]->touches());
     });
   };
   const uint64_t path_count = paths.path_count();
@@ -183,11 +186,11 @@ void render_sorted(RenderContext& context, SortedPaths& paths) {
                               static_cast<uint32_t>(path_count * (t + 1) / threads));
     });
     for (uint32_t pass = 0; pass < RaySorter::kPasses; ++pass) {
-      sort([&](unsigned t) { sorter.count(pass, t); });
-      sort([&](unsigned t) { sorter.scatter(pass, t); });
+      sort([&](unsigned t, TouchLog* touches) { sorter.count(pass, t, touches); });
+      sort([&](unsigned t, TouchLog* touches) { sorter.scatter(pass, t, touches); });
     }
     if (sorter.size() == 0) break;
-    sort([&](unsigned t) { sorter.clear(t); });
+    sort([&](unsigned t, TouchLog* touches) { sorter.clear(t, touches); });
     next_place = 0;
     together([&](unsigned t) { workers[t]->trace(sorter.size()); });
   }

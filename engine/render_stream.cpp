@@ -4,7 +4,7 @@
 namespace shoal {
 
 void render_stream(RenderContext& context) {
-  render_streamed(context, Order::kStream, [](const TopTree& tree, PageTable pages, TriangleTest test) {
+  render_streamed(context, Order::kStream, [](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog*) {
     return make_stream_traversal(tree, pages, test);
   });
 }

@@ -14,6 +14,7 @@
 #include "engine/preview.h"
 #include "engine/ray_list.h"
 #include "engine/ray_recorder.h"
+#include "engine/touch_recorder.h"
 
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
@@ -98,6 +99,7 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
       camera_cone_(shader_.follows_cones() ? pack_cone(context.camera.cone()) : 0),
       seeds_{context.sampler, context.tables.has_coverage(),
              shutter_times(context.scene.top_tree, context.picture.shading.effects)},
+      touches_(context.touches != nullptr ? &context.touches->log(thread) : nullptr),
       aovs_(context.aovs) {
   if (aovs_ == nullptr) return;
   seeks_ = aovs_->set().of_surface();
@@ -136,7 +138,7 @@ Ray RenderWorker::begin_path(uint64_t index, uint32_t path_index, PathState& pat
   path.hit = Hit{};
   path.pending.store(1, std::memory_order_relaxed);
   ++counters_.samples_started_count;
-  counters_.path_state_moved_bytes += sizeof(PathState);
+  move_state(path);
   if (!camera_ray.seen) path.throughput = Vec3(0);
   const float t_max = camera_ray.seen ? kRayInfinity : kRayNowhere;
   const Ray ray = make_ray(path_index, path, seeds_, path.origin, path.direction, t_max, false);
@@ -167,7 +169,7 @@ bool RenderWorker::finish_ray(const Ray& ray, PathState& path) {
   RayCounters& rays = ray_counters(ray);
   ++rays.rays_finished_count;
   ++(ray.hit.valid() ? rays.ray_hits_count : rays.ray_misses_count);
-  counters_.path_state_moved_bytes += sizeof(PathState);
+  move_state(path);
   if (context_.list != nullptr) {
     context_.list->finish(ray, path);
   } else if (ray.any_hit()) {
@@ -202,7 +204,7 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
     context_.fail(std::move(status).error());
     return 0;
   }
-  counters_.path_state_moved_bytes += sizeof(PathState);
+  move_state(path);
   uint32_t count = 0;
   if (result.has_shadow) {
     const uint32_t bounce_after = path.bounce;
@@ -267,14 +269,19 @@ void RenderWorker::end_path(PathState& path) {
     if (!context_.film.add(path.pixel, radiance, covered, half)) ++counters_.film_saturated_count;
   }
   ++counters_.samples_committed_count;
-  counters_.path_state_moved_bytes += sizeof(PathState);
+  move_state(path);
 }
 
 PagePin RenderWorker::pin(TreeletId treelet) {
+  const uint64_t decoded_before = cache_counters_.decoded_bytes;
   Result<PagePin> pin = context_.cache.pin(context_.scene.treelets[treelet].geometry, cache_counters_);
   if (!pin.ok()) {
     context_.fail(std::move(pin).error());
     return {};
+  }
+  if (touches_ != nullptr && cache_counters_.decoded_bytes != decoded_before) [[unlikely]] {
+    const std::span<const std::byte> page = pin.value().bytes();
+    touches_->write(page.data(), page.size(), TouchKind::kPages);
   }
   return std::move(pin).value();
 }

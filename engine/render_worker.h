@@ -15,6 +15,7 @@
 #include "engine/render.h"
 #include "engine/sample_order.h"
 #include "io/page_cache.h"
+#include "treelets/touch_log.h"
 #include "treelets/trace_treelet.h"
 
 namespace shoal {
@@ -51,6 +52,7 @@ struct RenderContext {
   uint32_t packet_rays = 64;                        ///< ExecutionOptions
   Checkpoints* checkpoints = nullptr;    ///< or none
   PauseGate gate{};                      ///< of the threads, for checkpoints
+  TouchRecorder* touches = nullptr;      ///< or none: nobody measures
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -122,7 +124,7 @@ class RenderWorker {
   template <class Decide, class PixelOf>
   void step(RayGroup& group, Phase sending, const Decide& decide, const PixelOf& pixel_of) {
     enter(Phase::kTopTree);
-    group.address(context_.scene.top_tree);
+    group.address(context_.scene.top_tree, touches_);
     enter(sending);
     group.send(context_.scene.top_tree, decide);
     enter(Phase::kTraversal);
@@ -130,7 +132,8 @@ class RenderWorker {
       group.each([&](const Ray& ray) { count_treelets(pixel_of(ray), 1); });
     }
     counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_,
-                                                         context_.picture.shading.triangle_test, context_.inner_loop);
+                                                         context_.picture.shading.triangle_test, context_.inner_loop,
+                                                         touches_);
   }
   /// A ray of a group leaves it, for `next` or, with kNoIndex, because its answer is known: counts what it did there.
   void count_leaving(const GroupRay& member, TreeletId next);
@@ -191,6 +194,12 @@ class RenderWorker {
   RenderCounters& counters() { return counters_; }
   TraceCounters& trace_counters() { return trace_counters_; }
   CacheCounters& cache_counters() { return cache_counters_; }
+  /// Told what this thread touches; none: nobody measures.
+  TouchLog* touches() { return touches_; }
+  /// A ray is copied to, or from, where it waits.
+  void touch_waiting(const Ray* ray, TouchAction action) {
+    if (touches_ != nullptr) [[unlikely]] touches_->add(ray, sizeof(Ray), TouchKind::kQueues, action);
+  }
   /// Shows the preview, writes the checkpoint and calls the progress hook now and then, unless another thread is at it; sees
   /// stop requests. A safe point.
   void report_progress();
@@ -206,6 +215,11 @@ class RenderWorker {
   void end_features(const PathState& path, const Vec3& radiance);
   uint64_t uncharged_bytes() const { return cache_counters_.decoded_bytes - charged_bytes_; }
   void charge_loads_to(uint32_t pixel);
+  /// The path's state is read and written.
+  void move_state(const PathState& path) {
+    counters_.path_state_moved_bytes += sizeof(PathState);
+    if (touches_ != nullptr) [[unlikely]] touches_->write(&path, sizeof(PathState), TouchKind::kPathStates);
+  }
 
   RenderContext& context_;
   const unsigned thread_;
@@ -221,6 +235,7 @@ class RenderWorker {
   TraceCounters trace_counters_;
   ShadeCounters shade_counters_;
   InvalidSamples invalid_;  ///< of what the shader did not see
+  TouchLog* touches_ = nullptr;
   AovFilm *aovs_ = nullptr, *visits_aovs_ = nullptr, *loads_aovs_ = nullptr;  ///< where such AOVs are asked for
   bool seeks_ = false;          ///< paths begin with PathState::seeks
   uint64_t charged_bytes_ = 0;  ///< of cache_counters_.decoded_bytes

@@ -39,14 +39,21 @@ class SortedPaths final : public UnfinishedPaths {
     for (uint32_t path = 0; path < path_count_; ++path) visit_unfinished(states_[path], visit);
   }
 
-  /// The ray joins the next wave.
-  void put(const Ray& ray) {
+  /// The ray joins the next wave. `touches`, here and below: told what is touched, when somebody measures.
+  void put(const Ray& ray, TouchLog* touches = nullptr) {
     const uint64_t slot = 2ull * path_index_of(ray) + (ray.any_hit() ? 1 : 0);
     rays_[slot] = ray;
+    if (touches != nullptr) [[unlikely]] {
+      touches->write(rays_[slot], TouchKind::kQueues);
+      sorter.touch_item(slot, *touches);
+    }
     sorter.set(slot, ray.origin, ray.direction);
   }
   /// The ray of this wave that comes `place`-th.
-  const Ray& ray_at(uint64_t place) const { return rays_[sorter.slot_at(place)]; }
+  const Ray& ray_at(uint64_t place, TouchLog* touches = nullptr) const {
+    if (touches != nullptr) [[unlikely]] sorter.touch_place(place, *touches);
+    return rays_[sorter.slot_at(place)];
+  }
   /// Asks for the memory of that ray and of its path, which are anywhere.
   void prefetch(uint64_t place) const {
     const uint32_t slot = sorter.slot_at(place);

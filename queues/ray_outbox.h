@@ -13,12 +13,14 @@
 #include <cstdint>
 
 #include "queues/treelet_queues.h"
+#include "treelets/touch_log.h"
 
 namespace shoal {
 
 class RayOutbox {
  public:
-  explicit RayOutbox(TreeletQueues& queues) : queues_(queues) {}
+  /// `touches`: told where rays are written, when somebody measures.
+  explicit RayOutbox(TreeletQueues& queues, TouchLog* touches = nullptr) : queues_(queues), touches_(touches) {}
 
   void push(TreeletId treelet, const Ray& ray) {
     // Treelets are numbered along their storage order: those around the one in hand have buffers of their own.
@@ -26,7 +28,9 @@ class RayOutbox {
     Buffer& buffer = buffers_[place];
     if (buffer.treelet != treelet && buffer.count > 0) send(place);
     buffer.treelet = treelet;
-    rays_[place][buffer.count++] = ray;
+    Ray& to = rays_[place][buffer.count++];
+    to = ray;
+    if (touches_ != nullptr) [[unlikely]] touches_->write(to, TouchKind::kQueues);
     filled_ |= uint64_t{1} << place;
     if (buffer.count == kRaysPerBuffer) send(place);
   }
@@ -51,12 +55,16 @@ class RayOutbox {
 
   void send(uint32_t place) {
     Buffer& buffer = buffers_[place];
-    queues_.push(buffer.treelet, {rays_[place], buffer.count});
+    if (touches_ != nullptr) [[unlikely]] {
+      touches_->read(rays_[place], buffer.count * sizeof(Ray), TouchKind::kQueues);
+    }
+    queues_.push(buffer.treelet, {rays_[place], buffer.count}, touches_);
     buffer.count = 0;
     filled_ &= ~(uint64_t{1} << place);
   }
 
   TreeletQueues& queues_;
+  TouchLog* touches_;
   uint64_t filled_ = 0;  ///< a bit a buffer: it holds rays
   Buffer buffers_[kBuffers];
   Ray rays_[kBuffers][kRaysPerBuffer];

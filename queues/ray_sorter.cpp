@@ -17,6 +17,15 @@ uint64_t spread(uint64_t x) {
   return (x | (x << 2)) & 0x249249249249ull;
 }
 
+/// Histograms and the stack's places are left out: they stay in the innermost caches.
+void touch_range(const uint64_t* items, uint64_t first, uint64_t last, TouchAction action, TouchLog* touches) {
+  if (touches == nullptr) return;
+  constexpr uint64_t kAtOnce = 1 << 20;
+  for (; first < last; first += kAtOnce) {
+    touches->add(items + first, std::min(kAtOnce, last - first) * sizeof(uint64_t), TouchKind::kSorting, action);
+  }
+}
+
 }  // namespace
 
 RaySorter::RaySorter(const Bounds3& bounds, unsigned parts, uint64_t slots)
@@ -46,8 +55,9 @@ RaySorter::Range RaySorter::range(uint32_t pass, unsigned part) const {
   return {all * part / parts_, all * (part + 1) / parts_};
 }
 
-void RaySorter::clear(unsigned part) {
+void RaySorter::clear(unsigned part, TouchLog* touches) {
   const Range slots = range(0, part);
+  touch_range(items_.data(), slots.first, slots.last, TouchAction::kWrite, touches);
   std::fill(items_.data() + slots.first, items_.data() + slots.last, kEmpty);
 }
 
@@ -57,9 +67,10 @@ uint64_t RaySorter::size() const {
   return sum;
 }
 
-void RaySorter::count(uint32_t pass, unsigned part) {
+void RaySorter::count(uint32_t pass, unsigned part, TouchLog* touches) {
   const Range places = range(pass, part);
   const uint64_t* const from = source(pass);
+  touch_range(from, places.first, places.last, TouchAction::kRead, touches);
   Histogram& own = histograms_[part];
   std::fill(std::begin(own.digits), std::end(own.digits), 0);
   uint64_t total = 0;
@@ -71,7 +82,7 @@ void RaySorter::count(uint32_t pass, unsigned part) {
   if (pass == 0) own.total = total;
 }
 
-void RaySorter::scatter(uint32_t pass, unsigned part) {
+void RaySorter::scatter(uint32_t pass, unsigned part, TouchLog* touches) {
   uint32_t place[kDigits], next = 0;
   for (uint32_t digit = 0; digit < kDigits; ++digit) {
     for (unsigned p = 0; p < parts_; ++p) {
@@ -84,7 +95,12 @@ void RaySorter::scatter(uint32_t pass, unsigned part) {
   uint64_t* const to = target(pass);
   for (uint64_t i = places.first; i < places.last; ++i) {
     if (pass == 0 && from[i] == kEmpty) continue;
-    to[place[digit_of(from[i], pass)]++] = from[i];
+    uint64_t& item = to[place[digit_of(from[i], pass)]++];
+    item = from[i];
+    if (touches != nullptr) [[unlikely]] {
+      touches->read(from[i], TouchKind::kSorting);
+      touches->write(item, TouchKind::kSorting);
+    }
   }
 }
 

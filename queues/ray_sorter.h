@@ -8,6 +8,7 @@
 //   slot_at(place), place < size()              the sorted slots, until the next count(); slots may be set anew
 //
 // Properties and assumptions
+//   touches    told what is touched, when somebody measures.
 //   threads    `part` is 0 .. parts-1: any threads, each part once a step; a step ends before the next begins. set()
 //              from any thread, no slot from two.
 //   memory     fixed: 16 bytes a slot, 16 KiB a part.
@@ -17,6 +18,7 @@
 #include <memory>
 
 #include "io/huge_memory.h"
+#include "treelets/touch_log.h"
 #include "treelets/vector.h"
 
 namespace shoal {
@@ -32,18 +34,21 @@ class RaySorter {
     return 2 * slots * sizeof(uint64_t) + parts * sizeof(Histogram);
   }
 
-  void clear(unsigned part);
+  void clear(unsigned part, TouchLog* touches = nullptr);
   void set(uint64_t slot, const Vec3& origin, const Vec3& direction) {
     items_[slot] = key_of(origin, direction) << kSlotBits | slot;
   }
   bool empty(uint64_t slot) const { return items_[slot] == kEmpty; }
 
-  void count(uint32_t pass, unsigned part);
-  void scatter(uint32_t pass, unsigned part);
+  void count(uint32_t pass, unsigned part, TouchLog* touches = nullptr);
+  void scatter(uint32_t pass, unsigned part, TouchLog* touches = nullptr);
 
   /// Rays that were sorted. Requires: the first count() has ended.
   uint64_t size() const;
   uint32_t slot_at(uint64_t place) const { return static_cast<uint32_t>(sorted_[place] & (kMaxSlots - 1)); }
+  /// What set() of the slot writes, and what slot_at() reads.
+  void touch_item(uint64_t slot, TouchLog& touches) const { touches.write(items_[slot], TouchKind::kSorting); }
+  void touch_place(uint64_t place, TouchLog& touches) const { touches.read(sorted_[place], TouchKind::kSorting); }
 
  private:
   static constexpr uint32_t kSlotBits = 28, kDigitBits = 12, kDigits = 1u << kDigitBits;

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <mutex>
 
+#include "treelets/touch_log.h"
+
 namespace shoal {
 
 uint32_t RayBatch::next_block(RayBlock& out) {
@@ -14,6 +16,11 @@ uint32_t RayBatch::next_block(RayBlock& out) {
   next_ = pool_->next(block);
   pool_->release(block);
   return count;
+}
+
+std::span<const Ray> RayBatch::next_rays() const {
+  if (next_ == kNoIndex) return {};
+  return {pool_->block(next_).rays, pool_->count(next_)};
 }
 
 uint32_t TreeletQueues::blocks_needed(uint32_t treelet_count, uint32_t path_count, unsigned threads) {
@@ -33,7 +40,7 @@ TreeletQueues::TreeletQueues(uint32_t treelet_count, uint32_t path_count, unsign
       queues_(std::make_unique<Queue[]>(treelet_count)),
       pool_(blocks_needed(treelet_count, path_count, threads)) {}
 
-void TreeletQueues::push(TreeletId treelet, std::span<const Ray> rays) {
+void TreeletQueues::push(TreeletId treelet, std::span<const Ray> rays, TouchLog* touches) {
   Queue& queue = queues_[treelet];
   std::lock_guard guard(queue.lock);
   for (size_t pushed = 0; pushed < rays.size();) {
@@ -44,7 +51,9 @@ void TreeletQueues::push(TreeletId treelet, std::span<const Ray> rays) {
     }
     uint32_t& count = pool_.count(queue.head);
     const size_t fitting = std::min<size_t>(rays.size() - pushed, kRaysPerBlock - count);
-    std::copy_n(rays.data() + pushed, fitting, pool_.block(queue.head).rays + count);
+    Ray* const to = pool_.block(queue.head).rays + count;
+    std::copy_n(rays.data() + pushed, fitting, to);
+    if (touches != nullptr) touches->write(to, fitting * sizeof(Ray), TouchKind::kQueues);
     count += static_cast<uint32_t>(fitting);
     pushed += fitting;
   }

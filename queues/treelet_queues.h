@@ -20,6 +20,7 @@
 
 namespace shoal {
 
+class TouchLog;
 class TreeletQueues;
 
 /// The rays of one drain, block by block. A block goes back to the pool before its rays are handled, so that
@@ -29,6 +30,8 @@ class RayBatch {
   RayBatch(RayBlockPool& pool, BlockId first) : pool_(&pool), next_(first) {}
   /// Copies the next block's rays to `out` and frees the block; 0 at the end.
   uint32_t next_block(RayBlock& out);
+  /// The rays of the next block, where they are now.
+  std::span<const Ray> next_rays() const;
   /// `look(ray)` at every ray that is left, without taking it.
   template <class Look>
   void each(const Look& look) const {
@@ -50,7 +53,8 @@ class TreeletQueues {
   /// Memory of queues and pool for these numbers.
   static uint64_t bytes(uint32_t treelet_count, uint32_t path_count, unsigned threads);
 
-  void push(TreeletId treelet, std::span<const Ray> rays);
+  /// `touches`: told where the rays go, when somebody measures.
+  void push(TreeletId treelet, std::span<const Ray> rays, TouchLog* touches = nullptr);
   void push(TreeletId treelet, const Ray& ray) { push(treelet, {&ray, 1}); }
   RayBatch take(TreeletId treelet);
 

@@ -52,7 +52,8 @@ struct LaneTracer {
   static uint64_t bytes();
   /// Starts `most` rays of the stream, fewer if it ends, and traces them. Returns how many.
   /// Requires, as PacketTracer: a top tree of at most kMaxTopDepth levels.
-  uint64_t trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
+  uint64_t trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters,
+                 TouchLog* touches = nullptr);
 
   std::unique_ptr<struct SceneLanes> lanes;
 };
@@ -73,7 +74,8 @@ struct PacketTracer {
   /// Traces `most` full packets of the stream. When it ends before, also the rays that are left over; else those wait
   /// for the next call, or for next_waiting(). Requires: available(), that the tree is of a single_identity(), and
   /// TriangleTest::kWatertight.
-  PacketUse trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters);
+  PacketUse trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters,
+                  TouchLog* touches = nullptr);
   /// Takes a ray back that waits for a packet; nullptr: none does.
   Ray* next_waiting();
 

@@ -15,6 +15,7 @@
 #include "treelets/node_kernel-inl.h"
 #include "treelets/scene_kernels.h"
 #include "treelets/space_kernel-inl.h"
+#include "treelets/touch_kernel-inl.h"
 
 #ifndef SHOAL_TREELETS_SCENE_LANE
 #define SHOAL_TREELETS_SCENE_LANE
@@ -110,12 +111,13 @@ HWY_INLINE uint32_t enter_top_children(const RaySpace& ray, const TopNode& node,
 }
 #endif
 
-template <TriangleTest kTest>
+/// `Meter`: NoTouches, or TouchMeter to tell what is touched (treelets/touch_log.h).
+template <TriangleTest kTest, class Meter = NoTouches>
 class StreamTracer {
  public:
   StreamTracer(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
-               TraceCounters& counters)
-      : tables_(tables), lanes_(lanes.lanes), most_(most), stream_(stream), counters_(counters) {}
+               TraceCounters& counters, Meter meter = {})
+      : tables_(tables), lanes_(lanes.lanes), most_(most), stream_(stream), counters_(counters), meter_(meter) {}
 
   /// Returns the number of rays.
   HWY_INLINE uint64_t run() {
@@ -145,6 +147,8 @@ class StreamTracer {
       if (!served_) return idle_.add(index);
       ++started_;
       SceneLane& lane = lanes_[index];
+      touch_write(meter_, ray, sizeof(Ray), TouchKind::kInHand);
+      touch_write(meter_, &lane, offsetof(SceneLane, keys), TouchKind::kInHand);
       lane.ray = ray;
       lane.size = lane.base = lane.instance_base = 0;
       lane.work = {};
@@ -182,6 +186,7 @@ class StreamTracer {
     const uintptr_t node_at = reinterpret_cast<uintptr_t>(lane.nodes) + sizeof(QuantizedNode) * uintptr_t{lane.ref};
     const auto* at = reinterpret_cast<const std::byte*>((leaf_at & mask) | (node_at & ~mask));
     for (int line = 0; line < 3; ++line) hwy::Prefetch(at + 64 * line);
+    touch_ahead(meter_, at, 3, leaf != 0 ? TouchKind::kLeaves : TouchKind::kNodes);
     waiting_[leaf].add(index);
   }
 
@@ -192,6 +197,7 @@ class StreamTracer {
     for (;;) {
       while (lane.size > lane.base) {
         --lane.size;
+        touch_pop(meter_, lane);
         if (key_t(lane.keys[lane.size]) > t) continue;
         lane.ref = lane.refs[lane.size];
         if (HWY_LIKELY(lane.place == LanePlace::kTreelet)) return wait(index);
@@ -220,17 +226,20 @@ class StreamTracer {
     const uint32_t child = lane.ref & kIndexMask;
     switch (kind_of(lane.ref)) {
       case ChildKind::kEntry:
+        touch_read(meter_, &tables_.entries[child], sizeof(TreeletEntry), TouchKind::kTopTree);
         return enter_treelet(lane, tables_.entries[child]);
       case ChildKind::kNode: {
         lane.ref = child;
         const auto* at = reinterpret_cast<const std::byte*>(tables_.nodes + child);
         for (int line = 0; line < 4; ++line) hwy::Prefetch(at + 64 * line);
+        touch_ahead(meter_, at, 4, TouchKind::kTopTree);
         return true;
       }
       case ChildKind::kInstance:
         lane.place = LanePlace::kObject;
         lane.base = lane.instance_base = lane.size;
         lane.ray->instance = child;
+        touch_space(meter_, *lane.ray, tables_.instances[child], lane.context);
         lane.space = &lane.context.object_space(*lane.ray, tables_.instances[child]);
         lane.ref = tables_.instances[child].root_node;
         return true;
@@ -244,6 +253,8 @@ class StreamTracer {
     const std::byte* page = page_of(tables_, entry.treelet, stream_);
     if (HWY_UNLIKELY(page == nullptr)) return false;
     const TreeletView treelet(page);
+    touch_read(meter_, &tables_.pages[entry.treelet], sizeof page, TouchKind::kTopTree);
+    touch_read(meter_, &treelet.header->leaves_offset, sizeof(uint32_t), TouchKind::kNodes);
     lane.place = LanePlace::kTreelet;
     lane.base = lane.size;
     lane.entry = entry;
@@ -276,6 +287,9 @@ class StreamTracer {
     for (uint32_t i = 0; i < list.size(); ++i) {
       SceneLane& lane = lanes_[list[i]];
       ++lane.work.node_tests;
+      touch_ray(meter_, lane, *lane.space, *lane.ray, lane.work.node_tests, true);
+      touch_top_node(meter_, tables_.nodes[lane.ref]);
+      touch_entered(meter_, lane);
       lane.size += enter_top_children(*lane.space, tables_.nodes[lane.ref], lane.ray->t, lane.keys + lane.size,
                                       lane.refs + lane.size);
     }
@@ -288,6 +302,9 @@ class StreamTracer {
     for (uint32_t i = 0; i < list.size(); ++i) {
       SceneLane& lane = lanes_[list[i]];
       ++lane.work.node_tests;
+      touch_ray(meter_, lane, *lane.space, *lane.ray, lane.work.node_tests, true);
+      touch_node(meter_, lane.nodes[lane.ref]);
+      touch_entered(meter_, lane);
       lane.size += enter_children(*lane.space, lane.nodes[lane.ref], lane.ray->t, lane.keys + lane.size,
                                   lane.refs + lane.size);
     }
@@ -300,6 +317,8 @@ class StreamTracer {
     for (uint32_t i = 0; i < list.size(); ++i) {
       SceneLane& lane = lanes_[list[i]];
       const LeafView leaf = lane.leaf();
+      touch_ray(meter_, lane, *lane.space, *lane.ray, lane.work.triangle_tests, false);
+      touch_candidates(meter_, leaf);
       lane.work.triangle_tests += leaf.triangle_count;
       lane.candidates = find_candidates<kTest>(*lane.space, leaf, lane.ray->t);
     }
@@ -334,6 +353,7 @@ class StreamTracer {
   uint64_t started_ = 0;
   RayStream& stream_;
   TraceCounters& counters_;
+  [[no_unique_address]] Meter meter_;
   SceneLaneList waiting_[3];
   SceneLaneList idle_;   ///< lanes that the stream had no ray for
   bool served_ = false;  ///< it had one when it was last asked

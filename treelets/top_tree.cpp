@@ -11,6 +11,8 @@
 #include "treelets/ray_space.h"
 #include "treelets/space_kernel-inl.h"
 #include "treelets/top_tree.h"
+#include "treelets/touch_kernel-inl.h"
+#include "treelets/trace_touching.h"
 
 #ifndef SHOAL_TREELETS_TOP_TREE_TABLES
 #define SHOAL_TREELETS_TOP_TREE_TABLES
@@ -185,9 +187,12 @@ struct WalkLane {
   uint32_t bit;  ///< of Ray::more for the level of the node
 };
 
+/// `Meter`: NoTouches, or TouchMeter to tell what is touched (treelets/touch_log.h).
+template <class Meter = NoTouches>
 class Walker {
  public:
-  Walker(const TopTreeTables& tree, std::span<NextJob> jobs) : tree_(tree), jobs_(jobs) {}
+  Walker(const TopTreeTables& tree, std::span<NextJob> jobs, Meter meter = {})
+      : tree_(tree), jobs_(jobs), meter_(meter) {}
 
   HWY_INLINE void run() {
     for (uint32_t lane = 0; lane < kWalkLanes && next_job_ < jobs_.size(); ++lane) {
@@ -196,6 +201,8 @@ class Walker {
     while (active_ > 0) {
       for (uint32_t i = 0; i < active_; ++i) {
         WalkLane& lane = lanes_[i];
+        touch_ray(meter_, lane, *lane.place.space, *lane.job->ray, lane.job->node_tests, true);
+        touch_top_boxes(meter_, tree_.nodes[lane.place.node]);
         lane.chosen = cross_top_node(tree_.nodes[lane.place.node], lane.place, lane.job->ray->t);
       }
       for (uint32_t i = 0; i < active_;) {
@@ -215,6 +222,7 @@ class Walker {
       lane.job = &jobs_[next_job_++];
       Ray& ray = *lane.job->ray;
       RayContext& context = *lane.job->context;
+      touch_walk(meter_, *lane.job, lane);
       if (tree_.single_identity && context.object_instance != 0) {
         prepare_identity(ray, tree_.instances[0].max_abs_coordinate, context.object);
         context.object_instance = 0;
@@ -230,6 +238,7 @@ class Walker {
     Ray& ray = *lane.job->ray;
     for (;;) {
       const TopNode& node = tree_.nodes[lane.place.node];
+      touch_read(meter_, &node.parent, 8, TouchKind::kTopTree);  // and level
       const uint32_t level = lane.place.base + node.level;
       lane.bit = level < tree_.more_levels ? 1u << level : 0;
       if (!lane.place.again || lane.bit == 0 || (ray.more & lane.bit) != 0) {
@@ -257,23 +266,29 @@ class Walker {
       return climb(tree_, ray, context, lane.place) ? settle(lane) : leave(lane);
     }
     const TopNode& node = tree_.nodes[lane.place.node];
+    touch_read(meter_, node.child, sizeof node - offsetof(TopNode, child), TouchKind::kTopTree);
     if (descend(tree_, ray, context, lane.place, chosen.key & 7)) {
       lane.job->entry = node.child[chosen.key & 7];
       return false;
     }
     const auto* below = reinterpret_cast<const std::byte*>(tree_.nodes + lane.place.node);
     for (int line = 0; line < 4; ++line) hwy::Prefetch(below + 64 * line);
+    touch_ahead(meter_, below, 4, TouchKind::kTopTree);
     return settle(lane);
   }
 
   const TopTreeTables& tree_;
   std::span<NextJob> jobs_;
+  [[no_unique_address]] Meter meter_;
   size_t next_job_ = 0;
   uint32_t active_ = 0;
   WalkLane lanes_[kWalkLanes];
 };
 
-void next_entries(const TopTreeTables& tree, std::span<NextJob> jobs) { Walker(tree, jobs).run(); }
+void next_entries(const TopTreeTables& tree, std::span<NextJob> jobs) { Walker<>(tree, jobs).run(); }
+void next_touching(const TopTreeTables& tree, std::span<NextJob> jobs, TouchLog& log) {
+  Walker<TouchMeter>(tree, jobs, {&log}).run();
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
@@ -283,6 +298,7 @@ HWY_AFTER_NAMESPACE();
 namespace shoal {
 
 HWY_EXPORT(next_entries);
+HWY_EXPORT(next_touching);
 
 namespace {
 
@@ -321,6 +337,16 @@ void TopTree::next(std::span<NextJob> jobs) const {
   const TopTreeTables tables{nodes_.data(),    instances_.data(), options_.more_levels,
                              single_identity_, world_pad_scale_,  world_extent_};
   HWY_DYNAMIC_DISPATCH(next_entries)(tables, jobs);
+}
+
+void next_entries_touching(const TopTree& tree, std::span<NextJob> jobs, TouchLog& log) {
+  if (tree.nodes().empty()) return tree.next(jobs);
+  if (!tree.single_identity()) {  // prepared here, so that the walk needs no pad for it
+    for (const NextJob& job : jobs) tree.world_space(*job.ray, *job.context);
+  }
+  const TopTreeTables tables{tree.nodes().data(), tree.instances().data(), tree.more_levels(), tree.single_identity(),
+                             0, 0};
+  HWY_DYNAMIC_DISPATCH(next_touching)(tables, jobs, log);
 }
 
 uint32_t TopTree::next(Ray& ray, RayContext& context, uint64_t& node_tests) const {

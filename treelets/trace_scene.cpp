@@ -88,22 +88,22 @@ bool SceneTracer::use_packets() const {
   return test_ == TriangleTest::kWatertight && grouping_ != RayGrouping::kSingle && PacketTracer::available() && tree_.single_identity();
 }
 
-void SceneTracer::trace(RayStream& stream, TraceCounters& counters) {
+void SceneTracer::trace(RayStream& stream, TraceCounters& counters, TouchLog* touches) {
   const SceneTables tables = scene_tables(tree_, pages_, test_);
   if (slow_ || tree_.nodes().empty()) return trace_all_slowly(tables, stream, counters);
   if (!use_packets()) {
-    lanes_->trace(tables, ~uint64_t{0}, stream, counters);
+    lanes_->trace(tables, ~uint64_t{0}, stream, counters, touches);
     return;
   }
   WithWaiting single(stream, *packets_);
   for (;;) {
     if (in_packets_) {
-      const PacketUse use = packets_->trace(tables, kPacketsATrial, stream, counters);
+      const PacketUse use = packets_->trace(tables, kPacketsATrial, stream, counters, touches);
       if (use.packets < kPacketsATrial) return;
       const double rays = static_cast<double>(use.ray_visits), visits = static_cast<double>(use.node_visits);
       in_packets_ = grouping_ == RayGrouping::kPackets || rays >= kLeastRaysAVisit * visits;
     } else {
-      if (lanes_->trace(tables, kRaysBetweenTrials, single, counters) < kRaysBetweenTrials) return;
+      if (lanes_->trace(tables, kRaysBetweenTrials, single, counters, touches) < kRaysBetweenTrials) return;
       in_packets_ = true;
     }
   }

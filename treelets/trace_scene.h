@@ -21,6 +21,8 @@
 
 namespace shoal {
 
+class TouchLog;
+
 /// What one ray took.
 struct RayWork {
   uint32_t node_tests = 0, triangle_tests = 0;
@@ -57,8 +59,9 @@ class SceneTracer {
   ~SceneTracer();
   /// Of a tracer.
   static uint64_t bytes();
-  /// Until the stream has no ray left and none is under way.
-  void trace(RayStream& stream, TraceCounters& counters);
+  /// Until the stream has no ray left and none is under way. `touches`: told what is touched, when somebody measures
+  /// (treelets/trace_touching.h).
+  void trace(RayStream& stream, TraceCounters& counters, TouchLog* touches = nullptr);
 
  private:
   bool use_packets() const;

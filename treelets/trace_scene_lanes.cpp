@@ -17,6 +17,11 @@ uint64_t trace_lanes(const SceneTables& tables, SceneLanes& lanes, uint64_t most
   return StreamTracer<TriangleTest::kWatertight>(tables, lanes, most, stream, counters).run();
 }
 
+uint64_t trace_lanes_touching(const SceneTables& tables, SceneLanes& lanes, uint64_t most, RayStream& stream,
+                              TraceCounters& counters, TouchLog& touches) {
+  return StreamTracer<TriangleTest::kWatertight, TouchMeter>(tables, lanes, most, stream, counters, {&touches}).run();
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
 HWY_AFTER_NAMESPACE();
@@ -25,14 +30,19 @@ HWY_AFTER_NAMESPACE();
 namespace shoal {
 
 HWY_EXPORT(trace_lanes);
+HWY_EXPORT(trace_lanes_touching);
 
 LaneTracer::LaneTracer() : lanes(std::make_unique<SceneLanes>()) {}
 LaneTracer::~LaneTracer() = default;
 uint64_t LaneTracer::bytes() { return sizeof(LaneTracer) + sizeof(SceneLanes); }
 
-uint64_t LaneTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters) {
+uint64_t LaneTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters,
+                           TouchLog* touches) {
   if (HWY_UNLIKELY(tables.test != TriangleTest::kWatertight)) {
     return trace_lanes_by(tables, *lanes, most, stream, counters);
+  }
+  if (HWY_UNLIKELY(touches != nullptr)) {
+    return HWY_DYNAMIC_DISPATCH(trace_lanes_touching)(tables, *lanes, most, stream, counters, *touches);
   }
   return HWY_DYNAMIC_DISPATCH(trace_lanes)(tables, *lanes, most, stream, counters);
 }

@@ -10,6 +10,7 @@
 #include "treelets/node_kernel-inl.h"
 #include "treelets/packet_leaf_kernel-inl.h"
 #include "treelets/packet_state.h"
+#include "treelets/touch_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace shoal {
@@ -18,11 +19,19 @@ namespace HWY_NAMESPACE {
 #if HWY_MAX_BYTES >= 32
 
 /// One call: packets from the stream, several in turn.
+/// `Meter`: NoTouches, or TouchMeter to tell what is touched (treelets/touch_log.h).
+template <class Meter = NoTouches>
 class PacketRun : private PacketLeaves {
  public:
   PacketRun(const SceneTables& tables, PacketState& state, RayStream& stream, TraceCounters& counters,
-            PacketUse& use)
-      : PacketLeaves(counters), tables_(tables), state_(state), stream_(stream), counters_(counters), use_(use) {}
+            PacketUse& use, Meter meter = {})
+      : PacketLeaves(counters),
+        tables_(tables),
+        state_(state),
+        stream_(stream),
+        counters_(counters),
+        use_(use),
+        meter_(meter) {}
 
   /// `most` full packets, and when the stream ends before, what is left over.
   HWY_INLINE void run(uint64_t most) {
@@ -82,6 +91,7 @@ class PacketRun : private PacketLeaves {
     const F16 f;
     for (uint32_t i = 0; i < kLanes; ++i) {  // lanes without a ray get what the first one has
       const Ray& ray = *packet.rays[i];
+      touch_write(meter_, &ray, sizeof(Ray), TouchKind::kInHand);  // at its hit, or when it is done
       for (int axis = 0; axis < 3; ++axis) packet.world_origin[axis][i] = ray.origin[axis];
       for (int axis = 0; axis < 3; ++axis) packet.direction[axis][i] = ray.direction[axis];
       packet.t[i] = ray.t;
@@ -139,6 +149,7 @@ class PacketRun : private PacketLeaves {
   }
 
   HWY_INLINE void begin(Packet& packet) {
+    touch_write(meter_, &packet, offsetof(Packet, space), TouchKind::kInHand);
     prepare(packet);
     packet.size = packet.base = 0;
     packet.in_treelet = false;
@@ -152,6 +163,7 @@ class PacketRun : private PacketLeaves {
     while (packet.size > 0 && packet.alive != 0) {
       if (packet.size == packet.base) packet.in_treelet = false, packet.base = 0;
       const PacketEntry& entry = packet.stack[--packet.size];
+      touch_read(meter_, &entry, sizeof(PacketEntry), TouchKind::kInHand);
       const uint32_t rays = entry.rays & packet.alive & bits_of(hn::Le(hn::Load(f, entry.near), t));
       if (rays == 0) continue;
       visit(packet, entry.ref, rays);
@@ -178,10 +190,13 @@ class PacketRun : private PacketLeaves {
         const std::byte* page = tables_.pages[entry.treelet];
         if (page == nullptr) return;
         hwy::Prefetch(page);
+        touch_ahead(meter_, page, 1, TouchKind::kNodes);
         at = is_leaf(entry.root) ? page : page + sizeof(TreeletHeader) + sizeof(QuantizedNode) * size_t{entry.root};
       }
     }
     for (int line = 0; line < 4; ++line) hwy::Prefetch(at + 64 * line);
+    const bool of_treelet = packet.in_treelet && packet.size > packet.base;
+    touch_ahead(meter_, at, 4, !of_treelet ? TouchKind::kTopTree : is_leaf(ref) ? TouchKind::kLeaves : TouchKind::kNodes);
   }
 
   HWY_INLINE void finish(Packet& packet) {
@@ -198,7 +213,7 @@ class PacketRun : private PacketLeaves {
   HWY_INLINE void visit(Packet& packet, uint32_t ref, uint32_t rays) {
     if (packet.in_treelet) {
       if (is_leaf(ref)) {
-        cross_leaf(packet, ref, rays);
+        cross_leaf_told(packet, ref, rays);
       } else {
         cross_node(packet, ref, rays);
       }
@@ -213,16 +228,25 @@ class PacketRun : private PacketLeaves {
     packet.page = page_of(tables_, packet.entry.treelet, stream_);
     if (packet.page == nullptr) return;
     const TreeletView treelet(packet.page);
+    touch_read(meter_, &tables_.entries[child], sizeof(TreeletEntry), TouchKind::kTopTree);
+    touch_read(meter_, &tables_.pages[packet.entry.treelet], sizeof packet.page, TouchKind::kTopTree);
+    touch_read(meter_, &treelet.header->leaves_offset, sizeof(uint32_t), TouchKind::kNodes);
     packet.nodes = treelet.nodes;
     packet.leaves = packet.page + treelet.header->leaves_offset;
     count(packet.treelets, rays, 1);
     packet.in_treelet = true;
     packet.base = packet.size;
     if (is_leaf(packet.entry.root)) {
-      cross_leaf(packet, packet.entry.root, rays);
+      cross_leaf_told(packet, packet.entry.root, rays);
     } else {
       cross_node(packet, packet.entry.root, rays);
     }
+  }
+
+  HWY_INLINE void cross_leaf_told(Packet& packet, uint32_t ref, uint32_t rays) {
+    touch_packet(meter_, packet, rays, kLanes);
+    touch_leaf(meter_, LeafView(packet.leaves + size_t{4} * leaf_offset(ref)));
+    cross_leaf(packet, ref, rays);
   }
 
   /// Children of which some of `rays` enter go to the stack, the first to be entered on top.
@@ -230,6 +254,7 @@ class PacketRun : private PacketLeaves {
   HWY_INLINE void push_children(Packet& packet, uint32_t rays, uint32_t count_children, uint32_t there, const Plane& plane,
                                 const uint32_t* refs) {
     const F16 f;
+    touch_packet(meter_, packet, rays, kLanes);
     use_.node_visits += 1, use_.ray_visits += static_cast<uint64_t>(std::popcount(rays));
     count(packet.node_tests, rays, 1);
     const auto slope_x = hn::Load(f, packet.slope[0]), slope_y = hn::Load(f, packet.slope[1]),
@@ -271,6 +296,7 @@ class PacketRun : private PacketLeaves {
     for (uint32_t i = 0; i < size; ++i) {
       const uint32_t slot = keys[i] & 7;
       PacketEntry& entry = packet.stack[packet.size++];
+      touch_write(meter_, &entry, sizeof(PacketEntry), TouchKind::kInHand);
       hn::Store(hn::Load(f, near[slot]), f, entry.near);
       entry.ref = refs[slot];
       entry.rays = enter[slot];
@@ -279,6 +305,7 @@ class PacketRun : private PacketLeaves {
 
   HWY_INLINE void cross_top(Packet& packet, uint32_t index, uint32_t rays) {
     const TopNode& node = tables_.nodes[index];
+    touch_read(meter_, &node, sizeof(TopNode), TouchKind::kTopTree);
     uint32_t refs[8];
     uint32_t children = 0, there = 0;
     for (uint32_t slot = 0; slot < 8; ++slot) {
@@ -293,6 +320,7 @@ class PacketRun : private PacketLeaves {
 
   HWY_INLINE void cross_node(Packet& packet, uint32_t index, uint32_t rays) {
     const QuantizedNode& node = packet.nodes[index];
+    touch_read(meter_, &node, sizeof(QuantizedNode), TouchKind::kNodes);
     HWY_ALIGN float planes[6][8];
     const F8 f;
     for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -313,14 +341,20 @@ class PacketRun : private PacketLeaves {
   RayStream& stream_;
   TraceCounters& counters_;
   PacketUse& use_;
+  [[no_unique_address]] Meter meter_;
 };
 
 bool has_packets() { return true; }
 
 void trace_packets(const SceneTables& tables, PacketState& state, uint64_t most, RayStream& stream,
                    TraceCounters& counters, PacketUse& use) {
-  PacketRun(tables, state, stream, counters, use).run(most);
+  PacketRun<>(tables, state, stream, counters, use).run(most);
   counters.simd_lanes_count += kLeafLanes * use.node_visits, counters.simd_active_lanes_count += use.ray_visits;
+}
+
+void trace_packets_touching(const SceneTables& tables, PacketState& state, uint64_t most, RayStream& stream,
+                            TraceCounters& counters, PacketUse& use, TouchLog& touches) {
+  PacketRun<TouchMeter>(tables, state, stream, counters, use, {&touches}).run(most);
 }
 
 #else
@@ -328,6 +362,8 @@ void trace_packets(const SceneTables& tables, PacketState& state, uint64_t most,
 bool has_packets() { return false; }
 
 void trace_packets(const SceneTables&, PacketState&, uint64_t, RayStream&, TraceCounters&, PacketUse&) {}
+void trace_packets_touching(const SceneTables&, PacketState&, uint64_t, RayStream&, TraceCounters&, PacketUse&,
+                            TouchLog&) {}
 
 #endif
 
@@ -340,6 +376,7 @@ namespace shoal {
 
 HWY_EXPORT(has_packets);
 HWY_EXPORT(trace_packets);
+HWY_EXPORT(trace_packets_touching);
 
 PacketTracer::PacketTracer() : state(std::make_unique<PacketState>()) {}
 PacketTracer::~PacketTracer() = default;
@@ -347,8 +384,13 @@ uint64_t PacketTracer::bytes() { return sizeof(PacketTracer) + sizeof(PacketStat
 
 bool PacketTracer::available() { return HWY_DYNAMIC_DISPATCH(has_packets)(); }
 
-PacketUse PacketTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters) {
+PacketUse PacketTracer::trace(const SceneTables& tables, uint64_t most, RayStream& stream, TraceCounters& counters,
+                              TouchLog* touches) {
   PacketUse use;
+  if (HWY_UNLIKELY(touches != nullptr)) {
+    HWY_DYNAMIC_DISPATCH(trace_packets_touching)(tables, *state, most, stream, counters, use, *touches);
+    return use;
+  }
   HWY_DYNAMIC_DISPATCH(trace_packets)(tables, *state, most, stream, counters, use);
   return use;
 }

@@ -7,6 +7,7 @@
 
 #include "treelets/inner_loops.h"
 #include "treelets/trace_other_kinds.h"
+#include "treelets/trace_touching.h"
 #include "treelets/treelet_tracer-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -17,6 +18,10 @@ void trace(std::span<TraceJob> jobs, TraceCounters& counters) {
   Tracer<TriangleTest::kWatertight>(jobs, counters).run();
 }
 
+void trace_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log) {
+  Tracer<TriangleTest::kWatertight, TouchMeter>(jobs, counters, {&log}).run();
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
 HWY_AFTER_NAMESPACE();
@@ -25,6 +30,18 @@ HWY_AFTER_NAMESPACE();
 namespace shoal {
 
 HWY_EXPORT(trace);
+HWY_EXPORT(trace_touching);
+
+namespace {
+
+void add_tests(std::span<const TraceJob> jobs, TraceCounters& counters) {
+  for (const TraceJob& job : jobs) {
+    counters.node_tests_count += job.node_tests;
+    counters.triangle_tests_count += job.triangle_tests;
+  }
+}
+
+}  // namespace
 
 void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
   if (HWY_UNLIKELY(loop != InnerLoop::kMoreNumerous)) {
@@ -34,10 +51,12 @@ void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleT
   } else {
     trace_treelets_by(test, jobs, counters);
   }
-  for (const TraceJob& job : jobs) {
-    counters.node_tests_count += job.node_tests;
-    counters.triangle_tests_count += job.triangle_tests;
-  }
+  add_tests(jobs, counters);
+}
+
+void trace_treelets_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log) {
+  HWY_DYNAMIC_DISPATCH(trace_touching)(jobs, counters, log);
+  add_tests(jobs, counters);
 }
 
 void trace_treelet(std::span<const std::byte> page, const TreeletEntry& entry, const Instance& instance, Ray& ray,

@@ -15,6 +15,7 @@
 #include "treelets/leaf_test.h"
 #include "treelets/node_kernel-inl.h"
 #include "treelets/space_kernel-inl.h"
+#include "treelets/touch_kernel-inl.h"
 #include "treelets/trace_treelet.h"
 #include "treelets/trace_treelet_scalar.h"
 
@@ -62,10 +63,12 @@ class LaneList {
   uint8_t lanes_[kTraceLanes];
 };
 
-template <TriangleTest kTest>
+/// `Meter`: NoTouches, or TouchMeter to tell what is touched (treelets/touch_log.h).
+template <TriangleTest kTest, class Meter = NoTouches>
 class Tracer {
  public:
-  Tracer(std::span<TraceJob> jobs, TraceCounters& counters) : jobs_(jobs), counters_(counters) {}
+  Tracer(std::span<TraceJob> jobs, TraceCounters& counters, Meter meter = {})
+      : jobs_(jobs), counters_(counters), meter_(meter) {}
 
   HWY_INLINE void run() {
     for (uint32_t lane = 0; lane < kTraceLanes; ++lane) start(lane);
@@ -84,6 +87,7 @@ class Tracer {
   HWY_INLINE void start(uint32_t index) {
     while (next_job_ < jobs_.size()) {
       TraceJob& job = jobs_[next_job_++];
+      touch_job(meter_, job);
       const RaySpace& space = prepare(job);
       if (HWY_UNLIKELY(space.extreme)) {
         trace_treelet_scalar(job, counters_, kTest);
@@ -91,6 +95,7 @@ class Tracer {
       }
       TraceLane& lane = lanes_[index];
       const TreeletView treelet(job.page);
+      touch_header(meter_, treelet, lane, sizeof(TraceLane) - sizeof lane.keys - sizeof lane.refs);
       lane.job = &job;
       lane.space = &space;
       lane.nodes = treelet.nodes;
@@ -121,6 +126,7 @@ class Tracer {
     const uintptr_t node_at = reinterpret_cast<uintptr_t>(lane.nodes) + sizeof(QuantizedNode) * uintptr_t{lane.ref};
     const auto* at = reinterpret_cast<const std::byte*>((leaf_at & mask) | (node_at & ~mask));
     for (int line = 0; line < 3; ++line) hwy::Prefetch(at + 64 * line);
+    touch_ahead(meter_, at, 3, leaf != 0 ? TouchKind::kLeaves : TouchKind::kNodes);
     waiting_[leaf].add(index);
   }
 
@@ -130,6 +136,7 @@ class Tracer {
     const float t = lane.job->ray->t;
     while (lane.size > 0) {
       --lane.size;
+      touch_pop(meter_, lane);
       if (key_t(lane.keys[lane.size]) > t) continue;
       lane.ref = lane.refs[lane.size];
       return wait(index);
@@ -143,6 +150,9 @@ class Tracer {
     for (uint32_t i = 0; i < list.size(); ++i) {
       TraceLane& lane = lanes_[list[i]];
       ++lane.job->node_tests;
+      touch_ray(meter_, lane, *lane.space, *lane.job->ray, lane.job->node_tests, true);
+      touch_node(meter_, lane.nodes[lane.ref]);
+      touch_entered(meter_, lane);
       lane.size += enter_children(*lane.space, lane.nodes[lane.ref], lane.job->ray->t, lane.keys + lane.size,
                                   lane.refs + lane.size);
     }
@@ -155,6 +165,8 @@ class Tracer {
     for (uint32_t i = 0; i < list.size(); ++i) {
       TraceLane& lane = lanes_[list[i]];
       const LeafView leaf = lane.leaf();
+      touch_ray(meter_, lane, *lane.space, *lane.job->ray, lane.job->triangle_tests, false);
+      touch_candidates(meter_, leaf);
       lane.job->triangle_tests += leaf.triangle_count;
       lane.candidates = find_candidates<kTest>(*lane.space, leaf, lane.job->ray->t);
     }
@@ -184,6 +196,7 @@ class Tracer {
 
   std::span<TraceJob> jobs_;
   TraceCounters& counters_;
+  [[no_unique_address]] Meter meter_;
   size_t next_job_ = 0;
   LaneList waiting_[2];  ///< lanes that stand before a node, before a leaf
   TraceLane lanes_[kTraceLanes];

@@ -1,4 +1,4 @@
-#include "bench/cache_model.h"
+#include "engine/cache_model.h"
 
 #include <gtest/gtest.h>
 
@@ -7,16 +7,16 @@
 #include <map>
 #include <random>
 
-namespace shoal::bench {
+namespace shoal {
 namespace {
 
 constexpr uint64_t kLine = 64;
 
 /// 8 sets of 4 ways: 2 KiB.
-CacheModel small_cache() { return CacheModel({.outer = {.bytes = 2048, .ways = 4}, .inner = {}}); }
+CacheModel small_cache() { return CacheModel({.levels = {{.bytes = 2048, .ways = 4}}}); }
 
 TEST(CacheModel, FillsEachLineOfAStreamOnce) {
-  CacheModel cache({.outer = {}, .inner = {}});
+  CacheModel cache(CacheModel::Options{});
   const uint64_t bytes = 8u << 20;
   for (uint64_t at = 0; at < bytes; at += 8) cache.touch(at, 8, false, 0);
   cache.flush();
@@ -64,7 +64,7 @@ TEST(CacheModel, EvictsTheLeastRecentlyTouched) {
 }
 
 TEST(CacheModel, AStrideOfAllSetsUsesOneSet) {
-  CacheModel cache({.outer = {.bytes = 2u << 20, .ways = 16}, .inner = {}});
+  CacheModel cache({.levels = {{.bytes = 2u << 20, .ways = 16}}});
   for (int round = 0; round < 2; ++round) {
     for (uint64_t i = 0; i < 17; ++i) cache.touch(i * 2048 * kLine, 1, false, 0);
   }
@@ -115,7 +115,7 @@ TEST(CacheModel, CountsFillsForWhoReadsAndWriteBacksForWhoWroteLast) {
 
 TEST(CacheModel, AnInnerCacheHidesItsHitsFromTheOrderOfTheOuter) {
   const CacheShape outer{.bytes = 4 * kLine, .ways = 4}, inner{.bytes = 2 * kLine, .ways = 2};
-  CacheModel alone({.outer = outer, .inner = {}}), behind({.outer = outer, .inner = inner});
+  CacheModel alone({.levels = {outer}}), behind({.levels = {inner, outer}});
   const auto touch = [&](uint64_t line) {
     for (CacheModel* cache : {&alone, &behind}) cache->touch(line * kLine, 1, false, 0);
   };
@@ -129,7 +129,7 @@ TEST(CacheModel, AnInnerCacheHidesItsHitsFromTheOrderOfTheOuter) {
 
 TEST(CacheModel, WhatTheInnerCacheLetsGoIsNotFetched) {
   const CacheShape outer{.bytes = 2 * kLine, .ways = 2}, inner{.bytes = 2 * kLine, .ways = 2};
-  CacheModel cache({.outer = outer, .inner = inner});
+  CacheModel cache({.levels = {inner, outer}});
   cache.touch(0, 8, true, 0);
   for (const uint64_t line : {1, 0, 2, 0, 3, 0}) cache.touch(line * kLine, 8, false, 0);
   EXPECT_EQ(cache.counts().fills, 4u);  // line 0 has left the outer cache, not the inner one
@@ -168,7 +168,7 @@ class PlainCache {
 
 TEST(CacheModel, AgreesWithItsDefinitionOnRandomTouches) {
   const CacheShape shape{.bytes = 16384, .ways = 4};
-  CacheModel cache({.outer = shape, .inner = {}});
+  CacheModel cache({.levels = {shape}});
   PlainCache plain(shape);
   std::mt19937_64 random(3);
   for (int i = 0; i < 200'000; ++i) {
@@ -182,10 +182,9 @@ TEST(CacheModel, AgreesWithItsDefinitionOnRandomTouches) {
 }
 
 TEST(CacheModel, ASampleOfSetsSaysNearlyWhatAllSetsSay) {
-  CacheModel::Options options{.outer = {.bytes = 256u << 10, .ways = 16},
-                              .inner = CacheShape{.bytes = 16384, .ways = 4}};
+  CacheModel::Options options{.levels = {{.bytes = 16384, .ways = 4}, {.bytes = 256u << 10, .ways = 16}}};
   CacheModel all(options);
-  options.sample = 8;
+  options.one_in = 8;
   CacheModel some(options);
   std::mt19937_64 random(4);
   for (int i = 0; i < 300'000; ++i) {
@@ -200,16 +199,64 @@ TEST(CacheModel, ASampleOfSetsSaysNearlyWhatAllSetsSay) {
   expect_near(some.counts().write_backs, all.counts().write_backs);
 }
 
+TEST(CacheModel, SetsNeedNotBeAPowerOfTwo) {
+  const CacheShape shape{.bytes = 12 * 5 * kLine, .ways = 5};  // 12 sets
+  CacheModel cache({.levels = {shape}});
+  PlainCache plain(shape);
+  std::mt19937_64 random(5);
+  for (int i = 0; i < 50'000; ++i) {
+    const uint64_t line = random() % 150;
+    cache.touch(line * kLine, 8, false, 0);
+    plain.touch(line, false);
+  }
+  EXPECT_EQ(cache.counts().fills, plain.fills);
+}
+
+TEST(CacheModel, CountsWhatEachLevelIsAskedForAndLacks) {
+  CacheModel cache({.levels = {{.bytes = 2 * kLine, .ways = 2}, {.bytes = 8 * kLine, .ways = 8}}});
+  for (int round = 0; round < 2; ++round) {
+    for (uint64_t line = 0; line < 4; ++line) cache.touch(line * kLine, 8, line == 0, 0);
+    cache.touch(3 * kLine, 8, false, 0);
+  }
+  EXPECT_EQ(cache.level(0).accesses, 10u);
+  EXPECT_EQ(cache.level(0).misses, 8u);  // but for the two lines touched again at once
+  EXPECT_EQ(cache.level(0).write_backs, 2u);
+  EXPECT_EQ(cache.level(1).accesses, 8u);
+  EXPECT_EQ(cache.level(1).misses, 4u);
+  EXPECT_EQ(cache.counts().fills, 4u);
+  cache.flush();
+  EXPECT_EQ(cache.counts().write_backs, 1u);
+}
+
+TEST(CacheModel, ThreadsBehindASharedLastLevelFindWhatOthersBrought) {
+  const CacheShape shapes[] = {{.bytes = 2 * kLine, .ways = 2}, {.bytes = 64 * kLine, .ways = 8}};
+  const SetSample sample = SetSample::of(shapes, 1);
+  SharedCache last(shapes[1], sample);
+  CacheModel first({shapes, 1}, sample, &last), second({shapes, 1}, sample, &last);
+  for (CacheModel* cache : {&first, &second}) {
+    for (uint64_t line = 0; line < 16; ++line) cache->touch(line * kLine, 8, false, 0);
+    cache->flush();
+    EXPECT_EQ(cache->level(0).misses, 16u);
+  }
+  EXPECT_EQ(last.model().level(0).accesses, 32u);
+  EXPECT_EQ(last.model().level(0).misses, 16u);
+  EXPECT_EQ(last.model().counts().fills, 16u);
+}
+
 TEST(CacheModel, RefusesShapesItCannotModel) {
-  EXPECT_TRUE((CacheShape{.bytes = 48u << 10, .ways = 12}.check().ok()));
-  EXPECT_FALSE((CacheShape{.bytes = 3u << 20, .ways = 16}.check().ok()));
+  const CacheShape inner{.bytes = 48u << 10, .ways = 12};  // 64 sets
+  EXPECT_TRUE(inner.check().ok());
+  EXPECT_TRUE((CacheShape{.bytes = 105u << 20, .ways = 15}.check().ok()));
+  EXPECT_FALSE((CacheShape{.bytes = (3u << 20) + 64, .ways = 16}.check().ok()));
   EXPECT_FALSE((CacheShape{.bytes = 2u << 20, .ways = 0}.check().ok()));
   EXPECT_FALSE((CacheShape{.bytes = 0, .ways = 16}.check().ok()));
-  EXPECT_FALSE((CacheModel::Options{.outer = {}, .inner = {}, .sample = 3}.check().ok()));
-  EXPECT_FALSE((CacheModel::Options{.outer = {}, .inner = CacheShape{.bytes = 48u << 10, .ways = 12}, .sample = 128}
-                    .check()
-                    .ok()));
+  EXPECT_FALSE((CacheShape{.bytes = 3072, .ways = 16, .line_bytes = 48}.check().ok()));
+  EXPECT_FALSE((CacheModel::Options{.levels = {}}.check().ok()));
+  EXPECT_FALSE((CacheModel::Options{.levels = {{}, {.line_bytes = 128}}}.check().ok()));
+  EXPECT_FALSE((CacheModel::Options{.levels = {{}}, .one_in = 3}.check().ok()));
+  EXPECT_TRUE((CacheModel::Options{.levels = {inner, {}}, .one_in = 64}.check().ok()));
+  EXPECT_FALSE((CacheModel::Options{.levels = {inner, {}}, .one_in = 128}.check().ok()));
 }
 
 }  // namespace
-}  // namespace shoal::bench
+}  // namespace shoal

@@ -1,0 +1,95 @@
+#include "bins/compare_levels.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace shoal {
+namespace {
+
+constexpr const char* kModelHelp =
+    "render once more in each order, everything that rays touch through a model of the processor's caches: misses "
+    "and "
+    "memory bytes a ray (default; timed runs are not touched by it)";
+
+/// Orders whose kernels can tell what they touch; auto chooses among them.
+bool tells_touches(Order order) {
+  return order == Order::kAuto || order == Order::kQueued || order == Order::kDepthFirst ||
+         order == Order::kSorted || order == Order::kHybrid;
+}
+
+/// Why this render cannot be modelled; empty: it can.
+std::string why_not(const LevelArguments& arguments, const PreparedRender& prepared,
+                    const ExecutionOptions& execution) {
+  if (!arguments.model) return "not asked for";
+  if (prepared.picture.shading.triangle_test != TriangleTest::kWatertight) {
+    return "only kernels of --triangle-test watertight tell what they touch";
+  }
+  if (!tells_touches(execution.order)) return "kernels of this order do not tell what they touch";
+  if (execution.time_limit_seconds > 0) return "with a time limit a slower run is another picture";
+  return "";
+}
+
+/// Of the model, by all threads.
+uint64_t model_bytes(const CacheModel::Options& options, unsigned threads) {
+  uint64_t lines = 0;
+  for (size_t i = 0; i < options.levels.size(); ++i) {
+    const bool own = options.levels.size() == 1 || i + 1 < options.levels.size();
+    lines += options.levels[i].bytes / options.levels[i].line_bytes * (own ? threads : 1);
+  }
+  constexpr uint64_t kLogBytes = 64u << 10;
+  return lines / options.one_in * sizeof(uint64_t) + threads * kLogBytes;
+}
+
+}  // namespace
+
+void LevelArguments::declare(CLI::App& app) {
+  app.add_flag("--cache-model,!--no-cache-model", model, kModelHelp);
+  app.add_option(
+      "--cache-levels", cache_levels,
+      "caches to model, the innermost first, as SIZE:WAYS,..., such as 48K:12,2M:16,105M:15; the last of two "
+      "or more is shared by all threads (default: those of this machine)");
+  app.add_option("--cache-sets", cache_sets,
+                 "model one in so many sets of every cache, a power of two: faster, less sure")
+      ->capture_default_str();
+}
+
+Result<CacheModel::Options> LevelArguments::options() const {
+  CacheModel::Options options{.levels = machine_cache_levels().shapes, .one_in = cache_sets};
+  if (!cache_levels.empty()) {
+    SHOAL_ASSIGN_OR_RETURN(options.levels, parse_cache_levels(cache_levels));
+  }
+  SHOAL_RETURN_IF_ERROR(options.check());
+  return options;
+}
+
+Result<std::vector<float>> model_order(const LevelArguments& arguments, const PreparedRender& prepared,
+                                       const ExecutionOptions& execution, Console& console, LevelFigures& figures) {
+  figures.no_touches = why_not(arguments, prepared, execution);
+  if (!figures.no_touches.empty()) return std::vector<float>();
+  SHOAL_ASSIGN_OR_RETURN(const CacheModel::Options options, arguments.options());
+  figures.cache_source = arguments.cache_levels.empty() ? machine_cache_levels().source : "given";
+  TouchRecorder recorder(options);
+  ExecutionOptions modelled = execution;
+  modelled.touches = &recorder;
+  const unsigned threads =
+      execution.threads != 0 ? execution.threads : std::max(1u, std::thread::hardware_concurrency());
+  modelled.process_bytes += model_bytes(options, threads);
+  console.info(fmt::format("{}: modelling caches of {} ({})", figures.title, cache_levels_text(options.levels),
+                           figures.cache_source));
+  auto result = render(posix_file_system(), prepared.scene, prepared.picture, modelled, console_hooks(console));
+  console.end_progress();
+  if (!result.ok()) {
+    if (result.error().code != ErrorCode::kMemoryCap) return std::move(result).error();
+    figures.no_touches = "no room for the model under the cap: " + result.error().message;
+    return std::vector<float>();
+  }
+  figures.touches = recorder.report();
+  figures.threads = result.value().threads;
+  figures.modelled_seconds = result.value().seconds;
+  figures.rays = result.value().counters.total().rays_traced_count;
+  return std::move(result.value().rgba);
+}
+
+}  // namespace shoal
