@@ -17,6 +17,13 @@ constexpr float kSide = 3;           ///< of a quad: quad i is at x in [4i, 4i +
 constexpr float kLampHeight = 4;
 const Vec3 kBulb(6, 3, 1);
 
+/// All that there are but kAuto.
+const std::vector<Order> kOrders = [] {
+  std::vector<Order> orders;
+  for (uint8_t i = 1; !order_name(static_cast<Order>(i)).empty(); ++i) orders.push_back(static_cast<Order>(i));
+  return orders;
+}();
+
 enum Quad { kMatte, kMetalMirror, kMetalGlossy, kThinGlass };
 
 /// A matte, a mirror, a glossy and a thin glass quad side by side over a matte floor, below a lamp of triangles and a bulb.
@@ -109,7 +116,7 @@ TEST_F(RayKinds, OfTheCameraAreTheCamerasInTheOrderOfItsSamples) {
 TEST_F(RayKinds, AreTheSameListsWhateverTheOrderAndTheThreads) {
   const std::vector<RecordedKind> expected = recorded(Order::kDepthFirst, 1);
   EXPECT_GT(expected.size(), 15u);
-  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kHybrid}) {
+  for (const Order order : kOrders) {
     for (const unsigned threads : {1u, 3u}) {
       const std::vector<RecordedKind> kinds = recorded(order, threads);
       ASSERT_EQ(kinds.size(), expected.size());
@@ -197,7 +204,7 @@ TEST_F(RayKinds, HaveTheSameHitsInEveryOrderAndThoseOfTheRender) {
   const auto taken = take_kinds(fs_, built_->scene, picture_, execution_, {.rays = 1u << 20});
   ASSERT_TRUE(taken.ok()) << taken.error().message;
   std::vector<ExecutionOptions> orders;
-  for (const Order order : {Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kHybrid}) {
+  for (const Order order : kOrders) {
     orders.push_back(execution_);
     orders.back().order = order;
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <vector>
 
 #include "engine/trace_rays.h"
 #include "io/page_cache.h"
@@ -15,7 +16,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr Order kOrders[] = {Order::kAuto, Order::kQueued, Order::kDepthFirst, Order::kSorted, Order::kHybrid};
+/// All that there are, kAuto first.
+const std::vector<Order> kOrders = [] {
+  std::vector<Order> orders;
+  for (uint8_t i = 0; !order_name(static_cast<Order>(i)).empty(); ++i) orders.push_back(static_cast<Order>(i));
+  return orders;
+}();
 
 /// Triangles all over a box, baked, and a mesh of some that three nodes show.
 BuiltScene build_crowd(FileSystem& fs, MemoryFileSystem& memory) {
