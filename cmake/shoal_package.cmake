@@ -16,9 +16,9 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENTS_ALL program library development)
 
 set(abi ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
-set(about " Shoal is a path tracer for glTF scenes that do not fit in memory: it cuts the
- scene into treelets on disk, lets rays wait for the treelet they need, and
- loads each one for the many rays that wait for it, under a cap on memory.")
+set(about "Shoal is a path tracer for glTF scenes that do not fit in memory: it cuts the
+scene into treelets on disk, lets rays wait for the treelet they need, and
+loads each one for the many rays that wait for it, under a cap on memory.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME shoal)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libshoal${abi})
@@ -29,9 +29,9 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libshoal${abi} (= ${PROJECT_VERSION}-1)")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "render glTF scenes bigger than memory\n${about}")
-set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "rays through scenes bigger than memory (shared library)\n${about}\n .\n This package has the library that other programs trace rays with.")
+set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "rays through scenes bigger than memory (shared library)\n${about}\n\nThis package has the library that other programs trace rays with.")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
-  "rays through scenes bigger than memory (headers)\n${about}\n .\n This package has what programs are built with that use the library.")
+  "rays through scenes bigger than memory (headers)\n${about}\n\nThis package has what programs are built with that use the library.")
 
 # Debian wants these of every package: who may do what with it, and what changed.
 find_program(GZIP_PROGRAM gzip REQUIRED)

@@ -15,6 +15,7 @@ using Bytes = std::vector<std::byte>;
 
 constexpr size_t kMostParts = 256;
 constexpr uint32_t kMostPartBytes = 1u << 18;
+constexpr size_t kWord = 4;  // that a part goes on with
 
 /// Of a plain struct.
 template <class T>
@@ -58,6 +59,7 @@ Bytes file_of_parts(std::span<const std::byte> parts) {
     Bytes page(parts.begin(), parts.begin() + static_cast<ptrdiff_t>(stored));
     parts = parts.subspan(stored);
     page.resize(std::clamp<size_t>(head.bytes, stored, kMostPartBytes));
+    for (size_t i = stored; i < page.size() && stored >= kWord; ++i) page[i] = page[i - kWord];
     PageRecord record{};
     record.offset = bytes.size();
     record.raw_bytes = record.stored_bytes = static_cast<uint32_t>(page.size());
@@ -122,8 +124,7 @@ Result<std::vector<std::byte>> parts_of(const PageFile& file) {
     Bytes page(record.raw_bytes);
     uint64_t read_bytes = 0;
     SHOAL_RETURN_IF_ERROR(file.read_page(record.id, page, &read_bytes));
-    const auto last = std::find_if(page.rbegin(), page.rend(), [](std::byte b) { return b != std::byte{0}; });
-    page.erase(last.base(), page.end());
+    while (page.size() > kWord && page.back() == page[page.size() - 1 - kWord]) page.pop_back();
     if (page.size() > 0xffff || record.raw_bytes > kMostPartBytes) {
       return Error{ErrorCode::kInput, fmt::format("page {} of {} bytes is too large for a part", record.id, page.size())};
     }

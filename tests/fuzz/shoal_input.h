@@ -3,7 +3,8 @@
 //   'S'HOAL...   the file itself
 //   'R' file     the file, whose checksums are made right before it is opened
 //   'P' parts    what the file holds, without padding: a sound container is put around it
-// A part is a PartHead and `stored_bytes` bytes; up to `bytes` it goes on with zeros. Tables follow pages.
+// A part is a PartHead and `stored_bytes` bytes; up to `bytes` it goes on with the last four of them, again and again, as
+// tiles of textures do.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +26,7 @@ static_assert(sizeof(PartHead) == 8);
 
 /// The bytes of the file that an input stands for; never fails: what is nonsense gives a file that is.
 std::vector<std::byte> shoal_file_of(std::span<const std::byte> input);
-/// An input of the third kind. Requires: pages and tables below 64 KiB but for zeros at their ends, as in small scenes.
+/// An input of the third kind. Fails with: kInput (a page is too large; those of small scenes are not).
 Result<std::vector<std::byte>> parts_of(const PageFile& file);
 
 }  // namespace shoal::fuzz

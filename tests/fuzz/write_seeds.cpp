@@ -218,6 +218,10 @@ void put_built(const SeedFolder& folder, MemoryFileSystem& fs, const std::string
   if (!scene.ok()) stop(scene.error().message);
   const auto parts = parts_of(*scene.value().file);
   if (!parts.ok()) stop(parts.error().message);
+  fs.put("b.shoal", shoal_file_of(parts.value()));
+  const auto again = open_scene(fs, "b.shoal", ReadMode::kBuffered, {});
+  if (!again.ok()) stop(again.error().message);
+  if (const Status sound = verify_scene(again.value()); !sound.ok()) stop(sound.error().message);
   folder.put(name + ".parts", parts.value());
   if (!as_file) return;
   Bytes file = fs.contents("a.shoal");
@@ -229,7 +233,9 @@ void put_built(const SeedFolder& folder, MemoryFileSystem& fs, const std::string
 /// Coverage, emission, layers, instances, lights, two cameras: something in every table.
 testing::WrittenScene full_scene(MemoryFileSystem& fs) {
   testing::WrittenScene scene;
-  const uint32_t texture = scene.add_texture(fs, 9, 3, noise(108));
+  std::vector<uint8_t> texels = noise(12);
+  texels.resize(24, 200);  // a row of one colour: the tile goes on with it
+  const uint32_t texture = scene.add_texture(fs, 3, 2, texels);
   const json slot = {{"index", texture}, {"extensions", {{"KHR_texture_transform", {{"rotation", 1}}}}}};
   scene.json["materials"] = {
       {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}},
