@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,6 +53,8 @@ class HeaderBytes {
     left_ = left_.subspan(size + 1);
     return true;
   }
+  bool empty() const { return left_.empty(); }
+  uint64_t size() const { return left_.size(); }
   std::optional<HeaderBytes> take_value(uint64_t size) {
     if (size > left_.size()) return std::nullopt;
     HeaderBytes value(left_.first(size));
@@ -62,7 +66,39 @@ class HeaderBytes {
   std::span<const std::byte> left_;
 };
 
+/// Bytes of a value whose type has one length. The library reads so many whatever the attribute's size says: an
+/// attribute that says otherwise would be read as another header than the one that is checked here.
+std::optional<uint64_t> fixed_bytes(const std::string& type) {
+  static const std::map<std::string, uint64_t> kBytes = {{"box2f", 16},
+                                                         {"box2i", 16},
+                                                         {"chromaticities", 32},
+                                                         {"compression", 1},
+                                                         {"deepImageState", 1},
+                                                         {"double", 8},
+                                                         {"envmap", 1},
+                                                         {"float", 4},
+                                                         {"int", 4},
+                                                         {"keycode", 28},
+                                                         {"lineOrder", 1},
+                                                         {"m33d", 72},
+                                                         {"m33f", 36},
+                                                         {"m44d", 128},
+                                                         {"m44f", 64},
+                                                         {"rational", 8},
+                                                         {"tiledesc", 9},
+                                                         {"timecode", 8},
+                                                         {"v2d", 16},
+                                                         {"v2f", 8},
+                                                         {"v2i", 8},
+                                                         {"v3d", 24},
+                                                         {"v3f", 12},
+                                                         {"v3i", 12}};
+  const auto found = kBytes.find(type);
+  return found == kBytes.end() ? std::nullopt : std::optional(found->second);
+}
+
 struct Seen {
+  std::set<std::string> names;
   std::optional<Box> data_window, display_window;
   std::optional<uint64_t> channel_count;
   std::optional<uint8_t> compression;
@@ -84,7 +120,7 @@ std::optional<uint64_t> count_channels(HeaderBytes value) {
   std::string name;
   for (uint64_t count = 0; count <= kMaxExrChannels; ++count) {
     if (!value.take_name(name)) return std::nullopt;
-    if (name.empty()) return count > 0 ? std::optional(count) : std::nullopt;
+    if (name.empty()) return count > 0 && value.empty() ? std::optional(count) : std::nullopt;
     int32_t type, x_sampling, y_sampling;
     uint32_t linear;
     if (!value.take(type) || !value.take(linear) || !value.take(x_sampling) || !value.take(y_sampling)) {
@@ -95,8 +131,39 @@ std::optional<uint64_t> count_channels(HeaderBytes value) {
   return std::nullopt;
 }
 
+/// Strings, each behind its length.
+bool is_string_vector(HeaderBytes value) {
+  while (!value.empty()) {
+    int32_t size = -1;
+    if (!value.take(size) || size < 0 || !value.take_value(static_cast<uint64_t>(size))) return false;
+  }
+  return true;
+}
+
+/// Width, height and RGBA.
+bool is_preview(HeaderBytes value) {
+  uint32_t width = 0, height = 0;
+  if (!value.take(width) || !value.take(height) || width > kMaxHeaderBytes || height > kMaxHeaderBytes)
+    return false;
+  return uint64_t{4} * width * height == value.size();
+}
+
+/// Whether the library, which believes the type, reads the bytes that the attribute's size says. Unknown types are
+/// bytes.
+bool fits_its_type(const std::string& type, HeaderBytes value) {
+  if (const auto bytes = fixed_bytes(type)) return value.size() == *bytes;
+  if (type == "stringvector") return is_string_vector(value);
+  if (type == "preview") return is_preview(value);
+  if (type == "floatvector") return value.size() % sizeof(float) == 0;
+  if (type == "chlist") return count_channels(value).has_value();
+  return type != "idmanifest";  // compressed tables, of no use to a picture
+}
+
 /// What is wrong with an attribute, or nothing.
 std::string look_at(const std::string& name, const std::string& type, HeaderBytes value, Seen& seen) {
+  if (!seen.names.insert(name).second) return "expected an attribute once, found it twice";
+  if (!fits_its_type(type, value) && name != "channels")
+    return fmt::format("{} bytes are no value of type {}", value.size(), type);
   if (name == "dataWindow" || name == "displayWindow") {
     const auto box = type == "box2i" ? read_box(value) : std::nullopt;
     if (!box) return "expected a window of at most 2^20 pixels a side, found another";

@@ -74,7 +74,7 @@ class BadLuckBatch : public ::testing::Test {
     for (stdfs::recursive_directory_iterator at(options_.out, error), end; !error && at != end; at.increment(error)) {
       const std::string path = at->path().string(), name = at->path().filename().string();
       EXPECT_EQ(name.find(".tmp-"), std::string::npos) << when << " left " << path;
-      if (path.ends_with(".json")) EXPECT_TRUE(nlohmann::json::accept(text_of(path))) << when << ": " << path;
+      EXPECT_TRUE(!path.ends_with(".json") || nlohmann::json::accept(text_of(path))) << when << ": " << path;
       if (path.find("/records/") == std::string::npos) continue;
       const auto record = read_record(posix_file_system(), path);
       ASSERT_TRUE(record.has_value()) << when << ": " << path;
@@ -105,8 +105,7 @@ class BadLuckBatch : public ::testing::Test {
       }
       fs.arm(Fault::kNone, 0);
       const auto next = run(fs);
-      EXPECT_TRUE(next.ok()) << when << ": " << next.error().message;
-      if (next.ok()) EXPECT_EQ(next.value().counts.done + next.value().counts.skipped, 2u) << when;
+      EXPECT_TRUE(next.ok() && next.value().counts.done + next.value().counts.skipped == 2) << when;
       expect_whole_files(when + ", then another batch");
       for (const char* picture : {"/a.exr", "/deep/b.exr"}) EXPECT_EQ(text_of(options_.out + picture), "a picture") << when;
       if (HasFailure()) return call;

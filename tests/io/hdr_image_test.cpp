@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "io/exr_header.h"
 #include "io/image.h"
 #include "tests/support/faulty_file_system.h"
 #include "tests/support/memory_file_system.h"
@@ -145,6 +146,40 @@ TEST(Exr, RefusesFilesCutOffAnywhere) {
     ASSERT_FALSE(read.ok()) << size << " of " << bytes.size();
     ASSERT_EQ(read.error().code, ErrorCode::kInput);
   }
+}
+
+/// What the check says of a good file with one attribute more, in front; empty when it takes it.
+std::string with_attribute(const std::string& name, const std::string& type, const std::string& value) {
+  MemoryFileSystem fs;
+  EXPECT_TRUE(write_exr(fs, "out.exr", make_exr(4, 4)).ok());
+  const auto size = static_cast<uint32_t>(value.size());
+  const std::string text = name + '\0' + type + '\0' + std::string(reinterpret_cast<const char*>(&size), 4) + value;
+  const auto more = std::as_bytes(std::span(text));
+  auto bytes = fs.contents("out.exr");
+  bytes.insert(bytes.begin() + 8, more.begin(), more.end());
+  fs.put("more.exr", bytes);
+  const auto found = check_exr_header(*fs.open("more.exr", ReadMode::kBuffered).value(), kPixels);
+  return found.ok() ? "" : found.error().message;
+}
+
+// The library goes by an attribute's type: what it reads would be another header than the one that was checked.
+TEST(Exr, RefusesAttributesThatAreNotAsLongAsTheirType) {
+  EXPECT_EQ(with_attribute("sky", "float", std::string(4, '\0')), "");
+  EXPECT_EQ(with_attribute("sky", "unheard of", std::string(199, 'x')), "");
+  EXPECT_THAT(with_attribute("sky", "float", std::string(199, '\0')), HasSubstr("sky: 199 bytes are no value of type float"));
+  EXPECT_THAT(with_attribute("sky", "lineOrder", ""), HasSubstr("0 bytes are no value of type lineOrder"));
+  EXPECT_EQ(with_attribute("sky", "stringvector", std::string("\2\0\0\0ab\0\0\0\0", 10)), "");
+  EXPECT_THAT(with_attribute("sky", "stringvector", std::string("\2\0\0\x70ab", 6)), HasSubstr("no value of type stringvector"));
+  EXPECT_EQ(with_attribute("sky", "preview", std::string("\1\0\0\0\1\0\0\0rgba", 12)), "");
+  EXPECT_THAT(with_attribute("sky", "preview", std::string("\0\0\1\0\0\0\1\0rgba", 12)), HasSubstr("no value of type preview"));
+  EXPECT_THAT(with_attribute("sky", "idmanifest", std::string(40, '\1')), HasSubstr("no value of type idmanifest"));
+  EXPECT_THAT(with_attribute("sky", "chlist", std::string(1, '\0')), HasSubstr("no value of type chlist"));
+}
+
+// Channels of a second list would be added to those of the first.
+TEST(Exr, RefusesAnAttributeThatComesTwice) {
+  const std::string channel("Q\0\2\0\0\0\0\0\0\0\1\0\0\0\1\0\0\0\0", 19);
+  EXPECT_THAT(with_attribute("channels", "chlist", channel), HasSubstr("channels: expected an attribute once"));
 }
 
 TEST(HdrImage, ReadsTheColoursOrTheLuminanceOfAnExr) {
