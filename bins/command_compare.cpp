@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -14,8 +15,10 @@
 #include "bins/command.h"
 #include "bins/compare_kinds.h"
 #include "bins/compare_levels.h"
+#include "bins/compare_report.h"
 #include "bins/order_choice.h"
 #include "bins/render_options.h"
+#include "engine/render_record.h"
 #include "engine/render_report.h"
 
 namespace shoal {
@@ -28,6 +31,7 @@ struct Arguments {
   uint32_t runs = 1;
   KindArguments kinds;
   LevelArguments levels;
+  bool trace = false;
 };
 
 struct OrderResult {
@@ -36,6 +40,7 @@ struct OrderResult {
   std::vector<RenderResult> runs;  ///< without pictures
   std::vector<HardwareCounts> hardware{};  ///< of each run
   LevelFigures levels{};
+  RenderCourse course{};             ///< of the first
 
   /// The run that took the median time; of an even number, the faster of the two in the middle.
   const RenderResult& median() const {
@@ -51,15 +56,25 @@ struct OrderResult {
 struct Comparison {
   std::vector<OrderResult> orders;
   bool identical = true;  ///< every picture has the bits of the first
+  std::vector<ComparedPicture> pictures;
 };
 
 bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
+/// Of pictures on the page; of the first run.
+constexpr uint32_t kMostSide = 480;
+
+/// Where the trace of an order goes: its label, but what may stand in no name of a file.
+std::string trace_path(const Arguments& arguments, std::string label) {
+  for (char& c : label) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '-';
+  return arguments.out + "/trace-" + label + ".json";
+}
+
 /// The orders take turns, so that what else the machine does disturbs all alike. Of the pictures only the first is kept.
 Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& prepared, const HardwareCounters& hardware,
-                                 Console& console) {
+                                 RenderRecord& record, Console& console) {
   Comparison comparison;
   std::vector<float> first;
   const auto compare_picture = [&](std::vector<float> picture) {
@@ -78,18 +93,31 @@ Result<Comparison> render_orders(const Arguments& arguments, PreparedRender& pre
     for (OrderResult& order : comparison.orders) {
       RenderHooks hooks = console_hooks(console);
       hooks.planned = [&](const MemoryPlan& plan) { console.info(order.label + ": " + describe_plan(plan)); };
+      ExecutionOptions execution = order.execution;
+      if (run == 0) execution.record = &record;
+      if (run == 0 && arguments.trace) {
+        SHOAL_RETURN_IF_ERROR(record.open_trace(posix_file_system(), trace_path(arguments, order.label)));
+      }
       const HardwareCounts before = hardware.read();
-      auto result = render(posix_file_system(), prepared.scene, prepared.picture, order.execution, hooks);
+      auto result = render(posix_file_system(), prepared.scene, prepared.picture, execution, hooks);
       order.hardware.push_back(difference(hardware.read(), before));
       console.end_progress();
+      const Status traced = run == 0 ? record.finish_trace() : Status{};
       if (!result.ok()) return std::move(result).error();
-      compare_picture(std::exchange(result.value().rgba, {}));
+      SHOAL_RETURN_IF_ERROR(traced);
+      if (run == 0) order.course = record.take_course();
+      std::vector<float> picture = std::exchange(result.value().rgba, {});
+      if (run == 0) {
+        comparison.pictures.push_back(compare_pictures(order.label, picture, first.empty() ? picture : first,
+                                                       prepared.picture.width, prepared.picture.height, kMostSide));
+      }
+      compare_picture(std::move(picture));
       order.runs.push_back(std::move(result).value());
     }
   }
   for (OrderResult& order : comparison.orders) {
     const RenderResult& shown = order.median();
-    order.levels.title = order_name(order.execution.order);
+    order.levels.title = order.label;
     order.levels.rays = shown.counters.total().rays_traced_count;
     order.levels.hardware_available = hardware.available();
     order.levels.hardware_reason = hardware.reason();
@@ -109,7 +137,10 @@ Status check_arguments(const Arguments& arguments) {
   std::error_code code;
   std::filesystem::create_directories(arguments.out, code);
   if (code) return Error{ErrorCode::kStorage, fmt::format("{}: cannot be made: {}", arguments.out, code.message())};
-  return check_output(arguments.out + "/compare.json");
+  for (const char* name : {"/compare.json", "/compare.csv", "/timeline.csv", "/treelets.csv", "/report.html"}) {
+    SHOAL_RETURN_IF_ERROR(check_output(arguments.out + name));
+  }
+  return {};
 }
 
 Status write_text(const std::string& path, const std::string& text) {
@@ -133,8 +164,10 @@ Status write_report(const Arguments& arguments, const PreparedRender& prepared, 
     json["ray_kinds"] = nlohmann::ordered_json::parse(kinds_json(*kinds));
     SHOAL_RETURN_IF_ERROR(write_text(arguments.out + "/kinds.csv", kinds_csv(*kinds)));
   }
-  return write_text(arguments.out + "/compare.json",
-                    json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  CompareReport report{json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace), {}, comparison.pictures,
+                       own_command_line()};
+  for (const OrderResult& order : comparison.orders) report.courses.emplace_back(order.label, order.course);
+  return write_compare_report(posix_file_system(), arguments.out, report);
 }
 
 int run_compare(const Arguments& arguments, Console& console) {
@@ -144,15 +177,19 @@ int run_compare(const Arguments& arguments, Console& console) {
   const std::vector<OrderChoice> choices = parse_order_choices(arguments.orders).value();
   for (const OrderChoice& choice : choices) orders.push_back(choice.order);
   const size_t renders = orders.size() * (arguments.runs + (arguments.levels.model ? 1 : 0));
-  auto prepared = prepare_render(arguments.render, orders, renders > 1 ? 1 : 0, console);
+  RenderRecord record;
+  RenderArguments asked = arguments.render;
+  asked.execution.record = &record;  // for the plan
+  auto prepared = prepare_render(asked, orders, renders > 1 ? 1 : 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
+  prepared.value().execution.record = nullptr;  // of first runs only
   std::optional<KindOptions> kinds_asked;
   if (arguments.kinds.asked()) {
     kinds_asked = parse_kinds(arguments.kinds, arguments.runs).value();
     const Status fits = check_kinds(prepared.value(), choices, *kinds_asked);
     if (!fits.ok()) return console.error(fits.error());
   }
-  const auto compared = render_orders(arguments, prepared.value(), hardware, console);
+  const auto compared = render_orders(arguments, prepared.value(), hardware, record, console);
   if (!compared.ok()) return console.error(compared.error());
   const Comparison& comparison = compared.value();
   std::vector<TrafficColumn> columns;
@@ -191,12 +228,14 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
                   "comma-separated, queued also with its policy (queued:full): " + choice_names(order_choices()))
       ->delimiter(',')
       ->capture_default_str();
-  sub->add_option("--out", arguments->out, "folder for compare.json")->required();
+  sub->add_option("--out", arguments->out, "folder for report.html, compare.json and .csv")->required();
   sub->add_option("--runs", arguments->runs, "of each order, in turns; the one of median time is shown")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   arguments->kinds.declare(*sub);
   arguments->levels.declare(*sub);
+  sub->add_flag("--trace", arguments->trace,
+                "a trace of each order's first run as well, trace-ORDER.json, for Perfetto (docs/compare.md)");
   sub->callback([arguments, &console, &command] {
     command = [arguments, &console] { return run_compare(*arguments, console); };
   });

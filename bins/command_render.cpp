@@ -8,6 +8,7 @@
 #include "bins/choice_option.h"
 #include "bins/command.h"
 #include "bins/render_options.h"
+#include "engine/render_record.h"
 #include "engine/render_report.h"
 #include "engine/tonemap.h"
 
@@ -17,7 +18,7 @@ namespace {
 struct Arguments {
   RenderArguments render;
   CheckpointArguments checkpoint;
-  std::string output, png, preview, stats, tonemap = "pbr-neutral", target_noise;
+  std::string output, png, preview, stats, trace, tonemap = "pbr-neutral", target_noise;
   std::vector<std::string> aovs;
   float exposure = 0;
   double time_limit = 0;
@@ -52,7 +53,8 @@ Status check_arguments(const Arguments& arguments) {
   if (!arguments.checkpoint.range.empty() && !(arguments.png.empty() && arguments.preview.empty())) {
     return Error{ErrorCode::kUsage, "--sample-range with --png or --preview: a part is no picture yet; `shoal merge` has --png"};
   }
-  for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats}) {
+  for (const std::string& path : {arguments.output, arguments.png, arguments.preview, arguments.stats,
+                                  arguments.trace}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
   }
   return {};
@@ -102,6 +104,12 @@ int run_render(const Arguments& arguments, Console& console) {
   const auto checkpoint = checkpoint_options(arguments.checkpoint, arguments.output, console);
   if (!checkpoint.ok()) return console.error(checkpoint.error());
   asked.execution.checkpoint = checkpoint.value();
+  RenderRecord record;
+  if (!arguments.trace.empty()) {
+    const Status opened = record.open_trace(posix_file_system(), arguments.trace);
+    if (!opened.ok()) return console.error(opened.error());
+    asked.execution.record = &record;
+  }
   auto prepared = prepare_render(asked, {arguments.render.execution.order}, 0, console);
   if (!prepared.ok()) return console.error(prepared.error());
   PreparedRender& p = prepared.value();
@@ -110,9 +118,11 @@ int run_render(const Arguments& arguments, Console& console) {
   hooks.chosen = [&console](const ChosenOrder& chosen) { console.info(describe_order(chosen)); };
   const auto result = render(posix_file_system(), p.scene, p.picture, p.execution, hooks);
   console.end_progress();
+  const Status traced = record.finish_trace();  // of a render that was stopped as well
   if (!result.ok()) return console.error(result.error());
   const Status written = write_outputs(arguments, p, result.value());
   if (!written.ok()) return console.error(written.error());
+  if (!traced.ok()) return console.error(traced.error());
   remove_checkpoint(p.execution.checkpoint);
   if (arguments.has_time_limit || p.picture.noise.asked()) console.info(describe_samples(result.value()));
   if (p.picture.noise.asked() && !(result.value().noise && result.value().noise->meets(p.picture.noise))) {
@@ -147,6 +157,10 @@ void declare_render(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--tonemap", arguments->tonemap, "of --png and --preview: pbr-neutral, none")->capture_default_str();
   sub->add_option("--exposure", arguments->exposure, "of --png and --preview, in stops")->capture_default_str();
   sub->add_option("--stats", arguments->stats, "counters, options and machine as JSON");
+  sub->add_option("--trace", arguments->trace,
+                  "what each thread did, and queues and disk over time, for Perfetto (ui.perfetto.dev): Chrome trace format, "
+                  "less than 100 MB a minute; docs/compare.md")
+      ->type_name("F.json");
   sub->add_option("--aov", arguments->aovs,
                   "more layers in the picture, separated by commas, or all: albedo, normal, depth, position, variance, "
                   "samples, object_id, material_id, treelets, bytes (docs/aovs.md)")

@@ -6,7 +6,7 @@
 namespace shoal {
 
 extern const std::string_view kReportTheme;   ///< bins/report/theme.css
-extern const std::string_view kReportScript;  ///< bins/report/plots.js
+extern const std::string_view kReportScript;  ///< bins/report/*.js, one after the other
 /// The plotting library, uPlot; empty when it could not be fetched.
 extern const std::string_view kPlotStyle, kPlotScript, kPlotLicense;
 

@@ -54,8 +54,10 @@ struct Writer {
     for (const ReportTable::Row& row : block.rows) {
       html += row.marked ? "<tr class=\"marked\">" : "<tr>";
       for (const ReportCell& cell : row.cells) {
-        html += cell.value ? fmt::format("<td data-value=\"{}\">{}</td>", *cell.value, html_escape(cell.text))
-                           : fmt::format("<td>{}</td>", html_escape(cell.text));
+        html += "<td";
+        if (cell.value) html += fmt::format(" data-value=\"{}\"", *cell.value);
+        if (!cell.path.empty()) html += fmt::format(" data-path=\"{}\"", html_escape(cell.path));
+        html += fmt::format(">{}</td>", html_escape(cell.text));
       }
       html += "</tr>\n";
     }
@@ -64,15 +66,17 @@ struct Writer {
   }
 
   void operator()(const ReportPlot& plot) {
-    nlohmann::ordered_json spec = {{"x", plot.x_label}, {"y", plot.y_label}, {"logX", plot.log_x}, {"logY", plot.log_y}};
+    nlohmann::ordered_json spec = {{"x", plot.x_label}, {"y", plot.y_label},     {"logX", plot.log_x},
+                                   {"logY", plot.log_y}, {"bytes", plot.y_bytes}, {"stacked", plot.stacked}};
+    if (!plot.groups.empty()) spec["groups"] = plot.groups;
     size_t points = 0;
     for (const ReportSeries& series : plot.series) {
-      nlohmann::ordered_json one = {{"label", series.label}, {"line", series.line}, {"front", series.front},
+      nlohmann::ordered_json one = {{"label", series.label}, {"line", series.line}, {"front", series.front}, {"dots", series.dots},
                                     {"x", nlohmann::json::array()}, {"y", nlohmann::json::array()},
                                     {"names", nlohmann::json::array()}};
       for (size_t i = 0; i < series.x.size(); ++i) {
         if ((plot.log_x && !(series.x[i] > 0)) || (plot.log_y && !(series.y[i] > 0))) continue;
-        one["x"].push_back(series.x[i]), one["y"].push_back(series.y[i]), one["names"].push_back(series.names[i]);
+        one["x"].push_back(series.x[i]), one["y"].push_back(series.y[i]), one["names"].push_back(i < series.names.size() ? series.names[i] : series.label);
         ++points;
       }
       if (!one["x"].empty()) spec["series"].push_back(one);
@@ -81,6 +85,22 @@ struct Writer {
                         html_escape(plot.title),
                         report_has_plots() ? "" : fmt::format("<p class=\"missing\">{}</p>", kNoPlots));
     html += fmt::format("<script type=\"application/json\">{}</script></figure>\n", in_script(dump(spec)));
+  }
+
+  void operator()(const ReportHeatMaps& block) {
+    html += "<div class=\"gallery\">\n";
+    for (const ReportHeatMap& map : block.maps) {
+      const nlohmann::ordered_json spec = {{"unit", map.unit},
+                                           {"items", map.items_count},
+                                           {"itemsACell", map.items_a_cell},
+                                           {"end", map.scale_end},
+                                           {"cells", map.cells}};
+      html += fmt::format("<figure class=\"heat\" data-cells=\"{}\"><h3>{}</h3>\n<canvas></canvas><div class=\"scale\"></div>\n"
+                          "<script type=\"application/json\">{}</script></figure>\n",
+                          map.cells.size(), html_escape(map.title), in_script(dump(spec)));
+    }
+    html += "</div>\n";
+    if (!block.caption.empty()) html += fmt::format("<p class=\"note\">{}</p>\n", html_escape(block.caption));
   }
 
   void operator()(const ReportPictures& block) {
@@ -120,6 +140,7 @@ Result<std::string> report_html(const ReportPage& page) {
   html += kHead;
   html += fmt::format("<title>{}</title>\n<style>{}\n{}</style>\n</head>\n<body>\n", html_escape(page.title), kPlotStyle,
                       kReportTheme);
+  html += "<button class=\"theme\" type=\"button\" hidden></button>\n";
   html += fmt::format("<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n", html_escape(page.title), html_escape(page.subtitle));
   for (const ReportSection& section : page.sections) {
     html += fmt::format("<section>\n<h2>{}</h2>\n", html_escape(section.heading));

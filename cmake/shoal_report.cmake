@@ -29,7 +29,11 @@ if(SHOAL_REPORT_PLOTS AND NOT EXISTS ${report_folder}/${report_lock}.fetched)
 endif()
 
 file(READ ${report_source}/theme.css SHOAL_REPORT_THEME)
-file(READ ${report_source}/plots.js SHOAL_REPORT_SCRIPT)
+set(SHOAL_REPORT_SCRIPT "")
+foreach(script page bars plots heat)  # in the order in which they run
+  file(READ ${report_source}/${script}.js text)
+  string(APPEND SHOAL_REPORT_SCRIPT "${text}")
+endforeach()
 set(SHOAL_PLOT_STYLE "")
 set(SHOAL_PLOT_SCRIPT "")
 set(SHOAL_PLOT_LICENSE "")
@@ -39,7 +43,8 @@ if(SHOAL_REPORT_PLOTS AND EXISTS ${report_folder}/${report_lock}.fetched)
   file(READ ${report_library}/LICENSE SHOAL_PLOT_LICENSE)
 endif()
 set_property(DIRECTORY ${CMAKE_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS
-  ${report_source}/theme.css ${report_source}/plots.js ${report_source}/package-lock.json)
+  ${report_source}/theme.css ${report_source}/page.js ${report_source}/bars.js ${report_source}/plots.js
+  ${report_source}/heat.js ${report_source}/package-lock.json)
 configure_file(${report_source}/assets.cpp.in ${CMAKE_BINARY_DIR}/report/assets.cpp @ONLY)
 
 add_library(shoal_report_assets STATIC ${CMAKE_BINARY_DIR}/report/assets.cpp)

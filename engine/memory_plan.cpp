@@ -16,6 +16,7 @@
 #include "engine/process_memory.h"
 #include "engine/queued_paths.h"
 #include "engine/render.h"
+#include "engine/render_record.h"
 #include "engine/sorted_paths.h"
 #include "engine/split_memory.h"
 #include "io/image.h"
@@ -95,6 +96,7 @@ MemoryPlan fixed_parts(const SceneSizes& scene, const PictureOptions& picture, c
   plan.scratch_bytes = kProcessGrowthBytes + threads * kThreadBytes +
                        PageCache::overhead_bytes(scene.file, PagingOptions{.read_depth = 0}) +
                        scene.file.page_count() * sizeof(TreeletId) + scene.treelet_count * kSchedulerTreeletBytes;
+  if (execution.record != nullptr) plan.scratch_bytes += RenderRecord::bytes(threads, execution.paging.read_depth);
   plan.geometry_page_bytes = bytes_of_kind(pages, PageKind::kTreelet);
   plan.attribute_page_bytes = bytes_of_kind(pages, PageKind::kAttributes);
   plan.texture_page_bytes = bytes_of_kind(pages, PageKind::kTexture);

@@ -4,6 +4,7 @@
 
 #include "engine/aov_film.h"
 #include "engine/clock.h"
+#include "engine/render_record.h"
 
 namespace shoal {
 namespace {
@@ -127,8 +128,20 @@ void OrderRunner::run_queued(RenderContext& context) {
                                                          plan_.paths_in_flight));
   AovFilm* const loads = context.aovs != nullptr && context.aovs->set().has(Aov::kBytes) ? context.aovs : nullptr;
   TreeletScheduler scheduler(scene_, *queued_, context.cache, *policy, batches_, page_treelets_, loads,
-                             context.list == nullptr);
+                             context.list == nullptr, context.record);
+  if (context.record != nullptr) {
+    context.record->watch([this, treelets] {
+      QueueOccupancy queues;
+      for (TreeletId id = 0; id < treelets; ++id) {
+        const uint32_t waiting = queued_->waiting(id);
+        queues.rays_waiting_count += waiting;
+        queues.treelets_waiting_count += waiting > 0 ? 1 : 0;
+      }
+      return queues;
+    });
+  }
   render_queued(context, *queued_, scheduler, batches_);
+  if (context.record != nullptr) context.record->watch({});
   context.cache.finish_loads();  // which ask what waits
 }
 

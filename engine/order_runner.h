@@ -30,6 +30,8 @@ class OrderRunner {
   void run(RenderContext& context);
   /// The order that rendered most samples of the last pass, and why.
   const ChosenOrder& chosen() const { return chosen_; }
+  /// As treelet_of_pages() says.
+  std::span<const TreeletId> page_treelets() const { return page_treelets_; }
   /// Gives back what the orders hold from pass to pass.
   void release();
 

@@ -14,6 +14,7 @@
 #include "engine/order_runner.h"
 #include "engine/picture_identity.h"
 #include "engine/preview.h"
+#include "engine/render_record.h"
 #include "engine/render_report.h"
 #include "treelets/scene_traversal.h"
 
@@ -288,6 +289,12 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
     context.checkpoints = &checkpoints.emplace(fs, execution.checkpoint, beginning.identity, header, passes, sums.all(),
                                                hooks.warning);
   }
+  context.record = execution.record;
+  if (context.record != nullptr) {
+    SHOAL_RETURN_IF_ERROR(context.record->begin(scene, orders.page_treelets(), cache, execution.threads,
+                                                plan.read_depth, start_ticks, start));
+  }
+  const RecordedScope recorded(context.record, context.phases);
   context.forecast = {sums.adaptive ? 0 : pixels * range.count(), execution.time_limit_seconds};
   context.forecast.begins_with(context.samples_restored, context.seconds_before);
   context.forecast.mark(context.samples_restored, now_seconds() - start);

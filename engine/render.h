@@ -29,6 +29,7 @@
 
 namespace shoal {
 
+class RenderRecord;
 class TouchRecorder;
 
 struct PictureOptions {
@@ -100,6 +101,7 @@ struct ExecutionOptions {
   /// Ends the render when so many seconds have gone by since it began, within a pass (engine/pass_plan.h): with the
   /// picture of RenderResult::samples samples a pixel. Those of renders that it goes on from count. 0: none.
   double time_limit_seconds = 0;
+  RenderRecord* record = nullptr;  ///< keeps what the render does over time (engine/render_record.h), or none
 };
 
 /// The first preview that was there to be looked at.

@@ -15,6 +15,7 @@
 #include "engine/ray_list.h"
 #include "engine/ray_recorder.h"
 #include "engine/touch_recorder.h"
+#include "engine/render_record.h"
 
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
@@ -101,6 +102,10 @@ RenderWorker::RenderWorker(RenderContext& context, unsigned thread)
              shutter_times(context.scene.top_tree, context.picture.shading.effects)},
       touches_(context.touches != nullptr ? &context.touches->log(thread) : nullptr),
       aovs_(context.aovs) {
+  if (context.record != nullptr) {
+    record_ = &context.record->thread(thread);
+    record_progress(false);
+  }
   if (aovs_ == nullptr) return;
   seeks_ = aovs_->set().of_surface();
   if (aovs_->set().has(Aov::kTreelets)) visits_aovs_ = aovs_;
@@ -193,12 +198,18 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
   }
   const uint64_t waited_before = cache_counters_.waited_ticks;
   if (!pin_attributes()) return 0;
+  const uint64_t waited_for_page = cache_counters_.waited_ticks;
   const uint32_t bounce_before = path.bounce;
   ShadeResult result;
   Status status = shader_.shade_hit(path, geometry_.bytes(), attributes_.bytes(), result, shade_counters_,
                                     cache_counters_);
   if (const uint64_t waited = cache_counters_.waited_ticks - waited_before; waited > 0) {
-    phases_.give_to(Phase::kPaging, waited, now_ticks());
+    const uint64_t now = now_ticks();
+    phases_.give_to(Phase::kPaging, waited, now);
+    const uint64_t for_textures = cache_counters_.waited_ticks - waited_for_page;
+    if (record_ != nullptr && record_->traces() && for_textures > 0) {
+      record_->note_wait(kNoIndex, now - for_textures, now, 0);
+    }
   }
   if (!status.ok()) {
     context_.fail(std::move(status).error());
@@ -273,8 +284,9 @@ void RenderWorker::end_path(PathState& path) {
 }
 
 PagePin RenderWorker::pin(TreeletId treelet) {
-  const uint64_t decoded_before = cache_counters_.decoded_bytes;
+  const uint64_t decoded = cache_counters_.decoded_bytes, waited = cache_counters_.waited_ticks;
   Result<PagePin> pin = context_.cache.pin(context_.scene.treelets[treelet].geometry, cache_counters_);
+  if (record_ != nullptr) record_pin(treelet, true, decoded, waited);
   if (!pin.ok()) {
     context_.fail(std::move(pin).error());
     return {};
@@ -289,11 +301,13 @@ PagePin RenderWorker::pin(TreeletId treelet) {
 void RenderWorker::count_batch(const PagePin& geometry) {
   ++counters_.treelet_batches_count;
   counters_.treelet_visit_bytes += geometry.bytes().size();
+  if (record_ != nullptr) record_->note_batch(geometry.page());
 }
 
 bool RenderWorker::hold(TreeletId treelet) {
   enter(Phase::kPaging);
   let_go();
+  if (record_ != nullptr) record_begin_hand(treelet);
   geometry_ = pin(treelet);
   if (!geometry_) return false;
   in_hand_ = treelet;
@@ -308,6 +322,7 @@ bool RenderWorker::take_in_hand(TreeletId treelet) {
 }
 
 void RenderWorker::let_go() {
+  if (record_ != nullptr) record_end_hand();
   geometry_.reset();
   attributes_.reset();
   in_hand_ = attributes_of_ = kNoIndex;
@@ -324,7 +339,9 @@ bool RenderWorker::pin_attributes() {
   const PageId page = context_.scene.treelets[in_hand_].attributes;
   attributes_.reset();
   if (page != kNoPage) {
+    const uint64_t decoded = cache_counters_.decoded_bytes, waited = cache_counters_.waited_ticks;
     Result<PagePin> pin = context_.cache.pin(page, cache_counters_);
+    if (record_ != nullptr) record_pin(in_hand_, false, decoded, waited);
     if (!pin.ok()) {
       context_.fail(std::move(pin).error());
       return false;
@@ -337,6 +354,7 @@ bool RenderWorker::pin_attributes() {
 
 void RenderWorker::report_progress() {
   enter(Phase::kReporting);
+  if (record_ != nullptr) record_progress(true);
   context_.disk_read_bytes += cache_counters_.disk_read_bytes - disk_bytes_reported_;
   disk_bytes_reported_ = cache_counters_.disk_read_bytes;
   const bool stop = context_.hooks.stop != nullptr && context_.hooks.stop->load(std::memory_order_relaxed);
@@ -390,6 +408,7 @@ void RenderWorker::hand_in() {
   c.clamped_samples_count = shade_counters_.clamped_samples_count;
   c.take(shade_counters_.invalid);
   c.take(invalid_);
+  if (record_ != nullptr) record_progress(false);
   std::lock_guard guard(context_.mutex);
   context_.counters.add(c);
 }

@@ -14,6 +14,7 @@
 #include "engine/ray_group.h"
 #include "engine/render.h"
 #include "engine/sample_order.h"
+#include "engine/thread_record.h"
 #include "io/page_cache.h"
 #include "treelets/touch_log.h"
 #include "treelets/trace_treelet.h"
@@ -53,6 +54,7 @@ struct RenderContext {
   Checkpoints* checkpoints = nullptr;    ///< or none
   PauseGate gate{};                      ///< of the threads, for checkpoints
   TouchRecorder* touches = nullptr;      ///< or none: nobody measures
+  RenderRecord* record = nullptr;        ///< or none
 
   /// Samples that begin until the order ends: all of the pass, but for trials (engine/order_runner.h). Set while no
   /// order runs.
@@ -130,6 +132,9 @@ class RenderWorker {
     enter(Phase::kTraversal);
     if (visits_aovs_ != nullptr) {
       group.each([&](const Ray& ray) { count_treelets(pixel_of(ray), 1); });
+    }
+    if (record_ != nullptr) {
+      group.each([&](const Ray& ray) { record_->note_visit(context_.scene.top_tree.current(ray).treelet); });
     }
     counters_.treelet_visits_count += group.trace(context_.scene.top_tree, trace_counters_,
                                                          context_.picture.shading.triangle_test, context_.inner_loop,
@@ -213,6 +218,12 @@ class RenderWorker {
   /// The vertex `bounce`, which was shaded, is what the path sought, or is looked through when it `goes_on`.
   void note_features(PathState& path, uint32_t bounce, bool goes_on);
   void end_features(const PathState& path, const Vec3& radiance);
+  /// What a record is told (engine/render_worker_record.cpp); with none nothing.
+  void record_progress(bool due_only);
+  void record_begin_hand(TreeletId treelet);
+  void record_end_hand();
+  /// After a page was pinned before which the counters were these.
+  void record_pin(TreeletId treelet, bool geometry, uint64_t decoded_before, uint64_t waited_before);
   uint64_t uncharged_bytes() const { return cache_counters_.decoded_bytes - charged_bytes_; }
   void charge_loads_to(uint32_t pixel);
   /// The path's state is read and written.
@@ -237,6 +248,8 @@ class RenderWorker {
   InvalidSamples invalid_;  ///< of what the shader did not see
   TouchLog* touches_ = nullptr;
   AovFilm *aovs_ = nullptr, *visits_aovs_ = nullptr, *loads_aovs_ = nullptr;  ///< where such AOVs are asked for
+  ThreadRecord* record_ = nullptr;  ///< or none
+  LiveCounts recorded_;             ///< what it was told so far
   bool seeks_ = false;          ///< paths begin with PathState::seeks
   uint64_t charged_bytes_ = 0;  ///< of cache_counters_.decoded_bytes
   uint64_t disk_bytes_reported_ = 0;

@@ -4,6 +4,7 @@
 
 #include "engine/aov_film.h"
 #include "engine/clock.h"
+#include "engine/render_record.h"
 
 namespace shoal {
 namespace {
@@ -80,6 +81,7 @@ void TreeletScheduler::take_loaded() {
   for (const PageId page : loaded_) {
     const TreeletId treelet = page_treelets_[page];
     if (loads_aovs_ != nullptr) loads_aovs_->note_read_ahead(page, scene_.file->record(page).raw_bytes);
+    if (record_ != nullptr) record_->read_finished(page);
     if (treelet == kNoIndex || !resident(treelet)) continue;
     decision_.drain.push_back(treelet);
     rays_in_memory_ += paths_.waiting(treelet);
@@ -125,8 +127,10 @@ void TreeletScheduler::start_loads(CacheCounters& counters) {
 
 Prefetch TreeletScheduler::start_load(TreeletId treelet, CacheCounters& counters) {
   const TreeletPages& pages = scene_.treelets[treelet];
-  return wants_attributes(pages) ? cache_.prefetch_pair(pages.geometry, counters)
-                                 : cache_.prefetch(pages.geometry, counters);
+  const Prefetch answer = wants_attributes(pages) ? cache_.prefetch_pair(pages.geometry, counters)
+                                                  : cache_.prefetch(pages.geometry, counters);
+  if (record_ != nullptr && answer == Prefetch::kStarted) record_->read_started(treelet);
+  return answer;
 }
 
 }  // namespace shoal

@@ -22,6 +22,7 @@
 namespace shoal {
 
 class AovFilm;
+class RenderRecord;
 
 /// Fits the lengths of decisions to the size of the scene and to the paths in flight.
 PolicyOptions scaled_policy(PolicyOptions options, const PagingOptions& paging, uint32_t treelets,
@@ -54,7 +55,7 @@ class TreeletScheduler {
   /// `shades`: attributes are wanted beside the geometry.
   TreeletScheduler(const Scene& scene, const QueuedPaths& paths, PageCache& cache, DrainPolicy& policy,
                    UsualBatches& batches, std::span<const TreeletId> page_treelets, AovFilm* loads_aovs = nullptr,
-                   bool shades = true)
+                   bool shades = true, RenderRecord* record = nullptr)
       : scene_(scene),
         paths_(paths),
         cache_(cache),
@@ -62,7 +63,8 @@ class TreeletScheduler {
         batches_(batches),
         page_treelets_(page_treelets),
         loads_aovs_(loads_aovs),
-        shades_(shades) {}
+        shades_(shades),
+        record_(record) {}
 
   /// The treelet to drain next, or kNoIndex: nothing is worth it yet, or what is wanted is still on its way.
   TreeletId choose(bool more_coming, CacheCounters& counters);
@@ -89,6 +91,7 @@ class TreeletScheduler {
   std::span<const TreeletId> page_treelets_;
   AovFilm* loads_aovs_;  ///< where loads are charged to pixels, else none
   bool shades_;
+  RenderRecord* record_;  ///< or none
 
   std::mutex mutex_;
   Decision decision_;

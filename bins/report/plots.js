@@ -1,18 +1,10 @@
 // Draws the plots of a report page: each <figure class="plot"> holds its data as JSON in a <script>. Called by the page
-// itself. Uses uPlot (global `uPlot`) and the colours of theme.css. Errors are noted on the root element, where tests
-// look for them: data-errors; each drawn plot says how many points it has: data-drawn.
+// itself, after page.js and bars.js. Uses uPlot (global `uPlot`) and the colours of theme.css. Each drawn plot says how many
+// points it has: data-drawn.
 (function () {
   'use strict';
-  const root = document.documentElement;
-  const fail = (text) => { root.dataset.errors = (root.dataset.errors ? root.dataset.errors + '; ' : '') + text; };
-  window.addEventListener('error', (event) => fail(event.message));
-
-  const color = (name) => getComputedStyle(root).getPropertyValue('--' + name).trim();
-  const number = (value) => {
-    const size = Math.abs(value);
-    if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(2).replace('e+', 'e');
-    return String(Number(value.toPrecision(3)));
-  };
+  const report = window.shoalReport, { color, number } = report;
+  const text = (spec, value) => (spec.bytes ? report.bytes(value) : number(value));
 
   // One column of x for all series, sorted; each series has a value only at its own points.
   function aligned(series) {
@@ -25,11 +17,8 @@
   }
 
   // The name and the numbers of the point nearest to the pointer.
-  function tip(figure, plot, points) {
-    const box = document.createElement('div');
-    box.className = 'tip';
-    box.hidden = true;
-    plot.over.appendChild(box);
+  function follow(figure, plot, points) {
+    const box = report.tip(plot.over);
     plot.over.addEventListener('mousemove', (event) => {
       const left = event.offsetX, top = event.offsetY;
       let best = null, reach = 24 * 24;
@@ -38,13 +27,11 @@
         const dx = plot.valToPos(p.x, 'x') - left, dy = plot.valToPos(p.y, 'y') - top;
         if (dx * dx + dy * dy < reach) { reach = dx * dx + dy * dy; best = p; }
       }
-      box.hidden = best === null;
-      if (best === null) return;
-      box.textContent = best.name + '\n' + figure.spec.x + ' ' + number(best.x) + '\n' + figure.spec.y + ' ' + number(best.y);
-      box.style.left = Math.min(left + 12, plot.over.clientWidth - box.offsetWidth) + 'px';
-      box.style.top = (top + 12) + 'px';
+      if (best === null) return box.hide();
+      box.show(best.name + '\n' + figure.spec.x + ' ' + number(best.x) + '\n' + figure.spec.y + ' ' +
+               text(figure.spec, best.y), left, top);
     });
-    plot.over.addEventListener('mouseleave', () => { box.hidden = true; });
+    plot.over.addEventListener('mouseleave', box.hide);
   }
 
   // 1, 2 and 5 of each decade; every digit where that would be few, the decades alone where it would be many.
@@ -58,20 +45,23 @@
     return ticks.filter((tick) => tick >= low && tick <= high);
   }
 
-  function axis(label, log, size) {
+  // Steps of bytes are powers of two.
+  const kByteSteps = Array.from({ length: 60 }, (none, i) => Math.pow(2, i));
+
+  function axis(label, log, size, inBytes) {
     const font = 'px system-ui, "DejaVu Sans", sans-serif';
     const line = { stroke: color('grid'), width: 1 };
     return Object.assign({
       label, stroke: color('quiet'), font: '12' + font, labelFont: '13' + font, labelSize: 24, grid: line, ticks: line, size,
-      values: (plot, values) => values.map(number),
-    }, log ? { splits: (plot, side, low, high) => logTicks(low, high), filter: (plot, ticks) => ticks } : {});
+      values: (plot, values) => values.map(inBytes ? report.bytes : number),
+    }, inBytes ? { incrs: kByteSteps } : {}, log ? { splits: (plot, side, low, high) => logTicks(low, high), filter: (plot, ticks) => ticks } : {});
   }
 
   // Half a step of the curve beyond the smallest and the largest: round decades would leave much of the plot empty.
   function range(log) {
     return (plot, low, high) => {
       if (low === null) return [1, 10];
-      if (!log) return [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)];
+      if (!log) return [low < 0 || low > 0.5 * high ? low - 0.05 * (high - low || 1) : 0, high + 0.05 * (high - low || 1)];
       const reach = Math.max(Math.pow(high / low, 0.06), 1.08);
       return [low / reach, high * reach];
     };
@@ -85,20 +75,20 @@
       legend: { live: false },
       scales: { x: { time: false, distr: spec.logX ? 3 : 1, range: range(spec.logX) },
                 y: { distr: spec.logY ? 3 : 1, range: range(spec.logY) } },
-      axes: [axis(spec.x, spec.logX, 30), axis(spec.y, spec.logY, 62)],
+      axes: [axis(spec.x, spec.logX, 30), axis(spec.y, spec.logY, spec.bytes ? 74 : 62, spec.bytes)],
       series: [{ label: spec.x }].concat(spec.series.map((one, s) => {
         const stroke = one.front ? color('ink') : color('series-' + (s % 8 + 1));
         return {
-          label: one.label, stroke, width: one.front ? 1.5 : one.line ? 2 : 0, dash: one.front ? [4, 4] : undefined,
+          label: one.label, stroke, width: one.front || !one.dots ? 1.5 : one.line ? 2 : 0, dash: one.front ? [4, 4] : undefined,
           spanGaps: true, paths: one.line ? undefined : () => null,
-          points: { show: true, size: one.front ? 15 : 8, width: one.front ? 1.5 : 1, stroke,
+          points: { show: one.dots, size: one.front ? 15 : 8, width: one.front ? 1.5 : 1, stroke,
                     fill: one.front ? 'transparent' : stroke },
         };
       })),
     };
     if (figure.plot) figure.plot.destroy();
     figure.plot = new uPlot(options, data, figure.place);
-    tip(figure, figure.plot, points);
+    follow(figure, figure.plot, points);
     figure.element.dataset.drawn = String(points.filter((p) => Number.isFinite(p.y) && p.y !== null).length);
   }
 
@@ -106,13 +96,6 @@
     element, place: element.querySelector('.place'), plot: null,
     spec: JSON.parse(element.querySelector('script').textContent),
   }));
-  const drawAll = () => figures.forEach((figure) => {
-    try { draw(figure); } catch (problem) { fail(String(problem)); }
-  });
   if (typeof uPlot === 'undefined') return;  // the page says so in the plots' place
-  drawAll();
-  let waiting = 0;
-  window.addEventListener('resize', () => { clearTimeout(waiting); waiting = setTimeout(drawAll, 100); });
-  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', drawAll);
-  window.matchMedia('print').addEventListener('change', drawAll);
+  figures.forEach((figure) => report.draw(() => (figure.spec.groups ? report.drawBars(figure, axis) : draw(figure))));
 })();

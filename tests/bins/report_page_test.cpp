@@ -3,8 +3,8 @@
 // else that test skips itself and says so.
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <regex>
 
+#include "tests/bins/browser.h"
 #include "tests/bins/small_scene.h"
 #include "tests/support/white_box.h"
 
@@ -33,21 +33,6 @@ class ReportPage : public ::testing::Test {
   std::string html_;
   json json_;
 };
-
-std::vector<std::string> all_matches(const std::string& text, const std::string& pattern) {
-  std::vector<std::string> found;
-  const std::regex expression(pattern);
-  for (std::sregex_iterator it(text.begin(), text.end(), expression), end; it != end; ++it) found.push_back((*it)[1].str());
-  return found;
-}
-
-/// Between two marks, the first of each; empty without them.
-std::string between(const std::string& text, const std::string& from, const std::string& to) {
-  const size_t start = text.find(from);
-  if (start == std::string::npos) return "";
-  const size_t end = text.find(to, start + from.size());
-  return end == std::string::npos ? "" : text.substr(start + from.size(), end - start - from.size());
-}
 
 TEST_F(ReportPage, CarriesTheDocumentAndShowsItsNumbers) {
   const json carried = json::parse(between(html_, "<script type=\"application/json\" id=\"data\">", "</script>"), nullptr, false);
@@ -107,23 +92,10 @@ TEST_F(ReportPage, EverySentenceOfTheDocumentIsThere) {
   EXPECT_THAT(html_, HasSubstr("prefers-color-scheme: dark"));
 }
 
-/// The path of a Chromium; empty without one.
-std::string chromium(const TemporaryFolder& folder) {
-  if (const char* named = std::getenv("SHOAL_CHROMIUM"); named != nullptr) return named;
-  const ProgramRun found = run_shell(folder, "command -v chromium-headless-shell || command -v chromium || "
-                                             "command -v chromium-browser || command -v google-chrome");
-  return found.out.substr(0, found.out.find('\n'));
-}
-
 TEST_F(ReportPage, ABrowserDrawsEveryPlotWithoutAComplaint) {
-  const std::string browser = chromium(folder_);
-  if (browser.empty()) GTEST_SKIP() << "no Chromium: neither $SHOAL_CHROMIUM nor one in the path";
+  if (chromium(folder_).empty()) GTEST_SKIP() << "no Chromium: neither $SHOAL_CHROMIUM nor one in the path";
   if (!plots()) GTEST_SKIP() << "this program was built without the plotting library";
-  const ProgramRun run = Program(folder_, {browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-                                           "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
-                                           "--virtual-time-budget=5000", "--window-size=1200,900", "--dump-dom",
-                                           "file://" + folder_ / "out/report.html"})
-                             .wait();
+  const ProgramRun run = open_page(folder_, folder_ / "out/report.html");
   expect_exit(run, 0);
   ASSERT_THAT(run.out, HasSubstr("</html>")) << run.err;
   EXPECT_THAT(run.err, Not(HasSubstr("CONSOLE"))) << "what the page complained of";
