@@ -8,7 +8,7 @@
 #include <atomic>
 #include <memory>
 
-#include "treelets/binned_sah.h"
+#include "treelets/bvh_builder.h"
 #include "treelets/collapse_top.h"
 #include "treelets/collapse_wide.h"
 #include "treelets/crop_coverage.h"
@@ -41,12 +41,13 @@ RefArray make_refs_by_part(const TriangleSoup& soup, std::span<const uint32_t> p
 // The trees of all parts under nodes that join them, which only hold the array together: treelets are cut below.
 class ForestTree {
  public:
-  ForestTree(std::span<BuildRef> refs, std::span<const uint32_t> begin) : refs_(refs), begin_(begin) {
+  ForestTree(std::span<BuildRef> refs, std::span<const uint32_t> begin, BvhBuilder builder)
+      : refs_(refs), begin_(begin), builder_(builder) {
     const auto parts = static_cast<uint32_t>(begin.size() - 1);
     roots_.resize(parts);
     if (parts == 1) {
       roots_[0] = 0;
-      nodes_ = build_binary_tree(refs, {kMaxLeafTriangles});
+      nodes_ = build_tree(builder, refs, {kMaxLeafTriangles});
       return;
     }
     nodes_.reserve(2 * refs.size());  // what is never written takes no memory
@@ -79,7 +80,7 @@ class ForestTree {
 
   void add_part(uint32_t p) {
     const std::vector<BinaryNode> tree =
-        build_binary_tree(refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), {kMaxLeafTriangles});
+        build_tree(builder_, refs_.subspan(begin_[p], begin_[p + 1] - begin_[p]), {kMaxLeafTriangles});
     const auto shift = static_cast<uint32_t>(nodes_.size() - 1);
     for (size_t i = 0; i < tree.size(); ++i) {
       BinaryNode node = tree[i];
@@ -107,6 +108,7 @@ class ForestTree {
   static constexpr uint32_t kJoin = 0xffffffffu;  // in BinaryNode::bytes, not yet used
   std::span<BuildRef> refs_;
   std::span<const uint32_t> begin_;
+  BvhBuilder builder_;
   std::vector<BinaryNode> nodes_;
   std::vector<uint32_t> roots_;
 };
@@ -260,7 +262,7 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
   sums.degenerate_count += soup.size() - refs.size();
   if (refs.size() == 0) return {};
 
-  ForestTree joined(refs.refs(), begin);
+  ForestTree joined(refs.refs(), begin, options.builder);
   std::vector<BinaryNode>& tree = joined.nodes();
   std::vector<uint32_t> order(refs.size());
   tbb::parallel_for(size_t{0}, refs.size(), [&](size_t i) { order[i] = refs.refs()[i].id; });
@@ -277,12 +279,13 @@ Status build_forest(TriangleSoup&& input, std::vector<uint32_t>&& parts, uint32_
   return {};
 }
 
-uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout) {
+uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout, BvhBuilder builder) {
   // Soup 44 and its corners, the part 4, the reference 32, its place in the order 4; two nodes a triangle at most. While
   // a tree is put together, nodes lie in pieces of 8192 triangles too, which go back to the system as they are copied
   // where they are larger than 128 KiB; where they are not, both take less than these 88 bytes.
   constexpr uint64_t kNodes = 2 * sizeof(BinaryNode) + 8;
-  const uint64_t each = 9 * 4 + 4 + 4 + 12ull * layout.floats() + 4 + sizeof(BuildRef) + 4 + kNodes;
+  const uint64_t each = 9 * 4 + 4 + 4 + 12ull * layout.floats() + 4 + sizeof(BuildRef) + 4 + kNodes +
+                        builder_scratch_bytes(builder);
   return triangles * each;
 }
 

@@ -30,7 +30,7 @@ Status build_forest(TriangleSoup&& soup, std::vector<uint32_t>&& part_of, uint32
 
 /// Memory at once while `triangles` are built, soup and part_of included, pages in flight apart: an upper bound, which
 /// triangles that share nothing and lie far apart come near.
-uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout);
+uint64_t forest_bytes(uint64_t triangles, const CornerLayout& layout, BvhBuilder builder = BvhBuilder::kSah);
 /// Memory of one page while it is packed. `on_grid`: positions are multiples of a TriangleSoup::position_step.
 uint64_t page_in_flight_bytes(uint32_t treelet_bytes, const CornerLayout& layout, bool on_grid);
 

@@ -1,15 +1,16 @@
-// From a soup of triangles to treelets and a tree over them: binned SAH (Wald 2007, "On fast Construction of
-// SAH-based Bounding Volume Hierarchies") to a binary tree, collapsed to 8 children, cut into leaf treelets of at
-// most `treelet_bytes`, each packed into a page; small neighbours share a treelet.
+// From a soup of triangles to treelets and a tree over them: a binary tree by one of the builders (treelets/bvh_builder.h;
+// binned SAH unless another is asked for), collapsed to 8 children, cut into leaf treelets of at most `treelet_bytes`, each
+// packed into a page; small neighbours share a treelet.
 // Called by engine/build_scene for each object. Parallel inside (oneTBB); the result depends on the input
 // and the options only, not on the number of threads. Cost: O(n log n), about 0.7 us of one core and 60 bytes of
-// scratch a triangle beside the soup.
+// scratch a triangle beside the soup (by binned SAH).
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "io/result.h"
+#include "treelets/bvh_builder_kind.h"
 #include "treelets/coverage.h"
 #include "treelets/top_tree.h"
 #include "treelets/treelet_sink.h"
@@ -21,6 +22,7 @@ namespace shoal {
 struct BuildOptions {
   uint32_t treelet_bytes = 256u << 10;  ///< target of a geometry page, 4 KiB .. 4 MiB; one leaf may exceed it
   uint32_t pages_in_flight = 0;         ///< packed at once, at most; 0: two a thread
+  BvhBuilder builder = BvhBuilder::kSah;
 };
 
 inline constexpr uint32_t kMinTreeletBytes = 4u << 10;
@@ -50,7 +52,7 @@ struct InstanceBounds {
   Bounds3 bounds;  ///< world space
 };
 
-/// The 8-wide tree over instances; its leaves are ChildKind::kInstance. nodes[0] is the root.
+/// The 8-wide tree over instances, by binned SAH whatever builds the objects; its leaves are ChildKind::kInstance. nodes[0] is the root.
 std::vector<TopNode> build_instance_tree(std::span<const InstanceBounds> instances);
 
 }  // namespace shoal
