@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "bins/builder_option.h"
 #include "bins/command.h"
 #include "bins/positions_option.h"
 #include "bins/render_options.h"
@@ -17,6 +18,7 @@ struct BuildArguments {
   bool consume = false;
   PoseOptions pose;
   std::optional<PositionPrecision> positions;
+  std::optional<BvhBuilder> builder;
 };
 
 Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console) {
@@ -33,6 +35,7 @@ Result<SceneBuildReport> build(const BuildArguments& arguments, Console& console
   options.consume = arguments.consume;
   options.variant = arguments.variant;
   options.positions = arguments.positions.value_or(PositionPrecision::kExact);
+  options.builder = arguments.builder.value_or(BvhBuilder::kSah);
   options.pose = arguments.pose;
   options.planned = [&console](const BuildMemoryPlan& plan) { console.info(describe_plan(plan)); };
   options.progress = build_progress(console);
@@ -78,6 +81,7 @@ void declare_build(CLI::App& app, Console& console, Command& command) {
   sub->add_option("--scratch", arguments->scratch_folder,
                   "folder for what does not fit in memory: 40 bytes a triangle and 12 for each float of a corner's "
                   "attributes (default: that of the output)");
+  declare_builder(*sub, arguments->builder);
   declare_positions(*sub, arguments->positions);
   sub->add_option("--variant", arguments->variant, kVariantHelp);
   sub->add_flag("--consume", arguments->consume,

@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "bins/accuracy_options.h"
+#include "bins/builder_option.h"
 #include "bins/choice_option.h"
 #include "bins/lens_options.h"
 #include "bins/positions_option.h"
@@ -301,6 +302,7 @@ void RenderArguments::declare(CLI::App& app) {
       ->group("For experiments");
   app.add_option("--treelet-size", treelet_size, "bytes of a treelet when a glTF is built, 4K to 4M (default 256K)")
       ->group("For experiments");
+  declare_builder(app, builder)->group("For experiments");
   app.add_option("--page-cache", page_cache, "bytes of decoded pages kept (default: from the plan)")
       ->group("For experiments");
   app.add_option("--rays-in-flight", execution.rays_in_flight,
@@ -343,6 +345,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   build.scratch_folder = arguments.scratch_folder;
   build.pose = arguments.pose;
   build.positions = arguments.positions.value_or(PositionPrecision::kExact);
+  build.builder = arguments.builder.value_or(BvhBuilder::kSah);
   build.max_memory_bytes = prepared.execution.max_memory_bytes;
   if (!arguments.treelet_size.empty()) {
     SHOAL_ASSIGN_OR_RETURN(build.treelet_bytes, parse_treelet_size(arguments.treelet_size));
@@ -362,6 +365,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   if (is_shoal_file(arguments.scene)) {
     SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
     SHOAL_RETURN_IF_ERROR(check_positions(prepared.scene, arguments.positions));
+    SHOAL_RETURN_IF_ERROR(check_builder(prepared.scene, arguments.builder));
   }
   if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));

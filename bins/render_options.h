@@ -47,6 +47,7 @@ struct RenderArguments {
   std::string scene, environment, max_memory, page_cache, treelet_size, cache_folder, scratch_folder, variant, effects;
   PoseOptions pose;
   std::optional<PositionPrecision> positions;  ///< none: exact, or those of the .shoal
+  std::optional<BvhBuilder> builder;           ///< none: SAH, or that of the .shoal
   PictureOptions picture;
   ExecutionOptions execution;
   bool buffered_reads = false, allow_stale = false, discard_built = false;

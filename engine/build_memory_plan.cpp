@@ -44,8 +44,8 @@ constexpr uint64_t kMaxWriteBufferBytes = 256u << 10;
 constexpr uint32_t kMinGridCells = 4096, kMaxGridCells = 1u << 18;
 constexpr uint64_t kTrianglesPerCell = 128;
 
-uint64_t built_bytes(uint64_t triangles, const CornerLayout& layout) {
-  return forest_bytes(triangles, layout) + triangles * record_bytes(layout);
+uint64_t built_bytes(uint64_t triangles, const CornerLayout& layout, BvhBuilder builder) {
+  return forest_bytes(triangles, layout, builder) + triangles * record_bytes(layout);
 }
 
 /// The most over all objects.
@@ -63,9 +63,9 @@ Largest largest_of(const BuildMemoryNeeds& needs) {
     largest.layout = united(largest.layout, object.layout);
     largest.triangles += object.triangles;
     largest.object_triangles = std::max(largest.object_triangles, object.triangles);
-    largest.object_bytes = std::max(largest.object_bytes, built_bytes(object.triangles, object.layout));
+    largest.object_bytes = std::max(largest.object_bytes, built_bytes(object.triangles, object.layout, needs.builder));
     largest.least_bytes =
-        std::max(largest.least_bytes, built_bytes(std::min(object.triangles, kMinChunkTriangles), object.layout));
+        std::max(largest.least_bytes, built_bytes(std::min(object.triangles, kMinChunkTriangles), object.layout, needs.builder));
   }
   return largest;
 }
@@ -79,6 +79,7 @@ uint32_t cells_for(uint64_t triangles) {
 bool share_out(const BuildMemoryNeeds& needs, const Largest& largest, uint64_t cap, BuildMemoryPlan& plan) {
   plan.cap_bytes = cap;
   plan.forced_chunk_triangles = needs.forced_chunk_triangles;
+  plan.builder = needs.builder;
   plan.process_bytes = kProcessBytes;
   plan.document_bytes = needs.document_bytes + needs.pose_bytes;
   plan.tables_bytes = (largest.triangles * kPageBytesPerTriangle / needs.treelet_bytes + 2 + needs.objects.size()) *
@@ -130,7 +131,7 @@ uint64_t BuildMemoryPlan::image_bytes() const {
 
 uint64_t BuildMemoryPlan::chunk_triangles(const CornerLayout& layout) const {
   if (forced_chunk_triangles > 0) return forced_chunk_triangles;
-  return std::clamp<uint64_t>(chunk_bytes / built_bytes(1, layout), 1, kMaxChunkTriangles);
+  return std::clamp<uint64_t>(chunk_bytes / built_bytes(1, layout, builder), 1, kMaxChunkTriangles);
 }
 
 uint32_t BuildMemoryPlan::grid_cells(uint64_t triangles) const { return cells_for(triangles); }

@@ -10,6 +10,7 @@
 
 #include "io/file.h"
 #include "io/result.h"
+#include "treelets/bvh_builder_kind.h"
 #include "treelets/triangle_soup.h"
 
 namespace shoal {
@@ -30,6 +31,7 @@ struct BuildMemoryNeeds {
   uint32_t pose_windows = 0;             ///< of the primitive that is morphed or skinned by most accessors
   uint32_t treelet_bytes = 0;
   bool positions_on_grid = false;        ///< --positions other than exact
+  BvhBuilder builder = BvhBuilder::kSah;
   unsigned threads = 1;
   uint64_t forced_chunk_triangles = 0;   ///< 0: from the plan
 };
@@ -46,6 +48,7 @@ struct BuildMemoryPlan {
   unsigned threads = 1;
   uint64_t threads_bytes = 0;        ///< stacks, and staging of reads that are not aligned
   uint64_t forced_chunk_triangles = 0;
+  BvhBuilder builder = BvhBuilder::kSah;
 
   /// What is left for an image while it is tiled.
   uint64_t image_bytes() const;

@@ -45,6 +45,7 @@ Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, c
   SourceHash hash(source_hash(sources, true));
   hash.add(options.treelet_bytes);
   hash.add(static_cast<uint64_t>(options.positions));
+  hash.add(static_cast<uint64_t>(options.builder));
   SHOAL_ASSIGN_OR_RETURN(const auto pose, choose_pose(document, options.pose));
   if (pose) hash.add(pose->animation), hash.add(std::bit_cast<uint64_t>(pose->time + 0.0));
   if (pose && pose->has_shutter()) {
@@ -65,6 +66,7 @@ std::string build_record_json(const gltf::Document& document, const SceneHeader&
   json["source"] = std::filesystem::path(document.path).filename().string();
   json["content_hash"] = fmt::format("{:016x}", header.content_hash);
   json["options"] = {{"treelet_bytes", header.treelet_bytes},
+                     {"builder", bvh_builder_name(static_cast<BvhBuilder>(header.bvh_builder))},
                      {"positions", position_precision_name(static_cast<PositionPrecision>(header.position_bits))}};
   if (!variant.empty()) json["options"]["variant"] = variant;
   if (pose) {

@@ -165,6 +165,7 @@ class SceneBuilder {
     needs.instances += (motion_.meshes.size() + motion_.cameras.size()) * motion_.key_count;
     needs.treelet_bytes = options_.treelet_bytes;
     needs.positions_on_grid = options_.positions != PositionPrecision::kExact;
+    needs.builder = options_.builder;
     needs.threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
     needs.forced_chunk_triangles = options_.chunk_triangles;
     SHOAL_ASSIGN_OR_RETURN(memory_, plan_build_memory(needs, cap_bytes(), path_));
@@ -200,7 +201,7 @@ class SceneBuilder {
     for (const ObjectPlan& object : geometry_.objects) total_triangles_ += object_triangles(geometry_, object);
     const StreamInput stream{fs_, document_, flat_, geometry_, materials_, options_.stop, memory_.lanes};
     const ObjectBuildInput input{
-        fs_, path_, scratch_folder_, options_.stop, {options_.treelet_bytes, memory_.pages_in_flight},
+        fs_, path_, scratch_folder_, options_.stop, {options_.treelet_bytes, memory_.pages_in_flight, options_.builder},
         options_.positions, memory_, coverage, materials_.materials, sink,
         [this](const char* stage, uint64_t triangles) { count_progress(stage, triangles); },
         [this](const PrimitiveSource& source) { return consumer_ ? consumer_->source_done(source) : Status(); }};
@@ -311,6 +312,7 @@ class SceneBuilder {
     header.degenerate_count = report_.degenerate_count;
     header.texture_bytes = textures_.pages_bytes;
     header.content_hash = source_hash(sources_, false);
+    header.bvh_builder = static_cast<uint32_t>(options_.builder);
     header.position_bits = static_cast<uint32_t>(options_.positions);
     header.position_step = report_.position_step;
     header.position_error = report_.position_error;

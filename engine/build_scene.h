@@ -14,6 +14,7 @@
 #include "engine/position_grid.h"
 #include "io/gltf_document.h"
 #include "io/result.h"
+#include "treelets/bvh_builder_kind.h"
 
 namespace shoal {
 
@@ -31,6 +32,7 @@ struct SceneBuildOptions {
   /// also when the build fails or is stopped later on. Not for .glb.
   bool consume = false;
   PositionPrecision positions = PositionPrecision::kExact;
+  BvhBuilder builder = BvhBuilder::kSah;  ///< of the objects' trees; the tree over instances is always by SAH
   PoseOptions pose;               ///< the time that skins, morph targets and nodes are posed at
   uint64_t chunk_triangles = 0;   ///< triangles built at once; 0: from the memory plan (else for tests)
   std::string variant;            ///< KHR_materials_variants, by name; empty: the materials as they are
@@ -61,7 +63,7 @@ Result<SceneBuildReport> build_scene(FileSystem& fs, const std::string& gltf_pat
                                      const SceneBuildOptions& options);
 
 /// What a built scene is kept under: a hash of the JSON, of sizes and modification times of the files it names, of
-/// treelet size, precision of positions, pose, variant and builder version; not of the cap, which changes the tree but never the picture.
+/// treelet size, precision of positions, builder of trees, pose, variant and builder version; not of the cap, which changes the tree but never the picture.
 Result<uint64_t> build_cache_key(FileSystem& fs, const std::string& gltf_path, const SceneBuildOptions& options);
 
 }  // namespace shoal

@@ -12,6 +12,7 @@
 #include "engine/position_grid.h"
 #include "engine/tile_textures.h"
 #include "treelets/attribute_layout.h"
+#include "treelets/bvh_builder_kind.h"
 #include "treelets/trace_treelet.h"
 #include "treelets/treelet_layout.h"
 
@@ -68,6 +69,7 @@ class TableChecker {
       return corrupt(fmt::format("precision of positions: found {} bits, a step of {} and an error of {}", h.position_bits,
                                  h.position_step, h.position_error));
     }
+    if (h.bvh_builder >= kBvhBuilders.size()) return corrupt(fmt::format("builder: found {}", h.bvh_builder));
     for (int i = 0; i < 3; ++i) {
       if (h.bounds_lo[i] > h.bounds_hi[i]) return corrupt("bounds: expected lo <= hi");
     }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/effects.h"
+#include "treelets/bvh_builder_kind.h"
 
 namespace shoal {
 
@@ -23,6 +24,15 @@ std::string mebibytes(uint64_t bytes) { return fmt::format("{:.1f} MiB", static_
 
 void append_line(std::string& text, const char* name, const std::string& value) {
   text += fmt::format("{:<22}{}\n", name, value);
+}
+
+/// With the SAH cost of its trees (BuiltObject::sah_cost, summed over objects), as the build record has it.
+std::string describe_builder(const SceneHeader& header, const Json& record) {
+  std::string text(bvh_builder_name(static_cast<BvhBuilder>(header.bvh_builder)));
+  if (record.contains("sah_cost") && record["sah_cost"].is_number()) {
+    text += fmt::format(", SAH cost {:.1f}", record["sah_cost"].get<double>());
+  }
+  return text;
 }
 
 void append_pages(std::string& text, const char* name, uint64_t decoded, uint64_t stored) {
@@ -95,6 +105,7 @@ std::string scene_description_text(const Scene& scene) {
   append_line(text, "treelets",
               fmt::format("{} of about {} KiB, the largest {} KiB", d.treelets_count, h.treelet_bytes >> 10,
                           (h.largest_treelet_bytes + 1023) >> 10));
+  append_line(text, "builder", describe_builder(h, build));
   append_line(text, "positions", describe_positions(h));
   append_pages(text, "geometry", d.geometry_bytes, d.geometry_stored_bytes);
   append_pages(text, "attributes", d.attribute_bytes, d.attribute_stored_bytes);
@@ -147,6 +158,7 @@ std::string scene_description_json(const Scene& scene) {
                {"attribute_bytes_per_triangle", d.attribute_bytes_per_triangle},
                {"attribute_stored_bytes_per_triangle", d.attribute_stored_bytes_per_triangle},
                {"largest_treelet_bytes", h.largest_treelet_bytes},
+               {"builder", bvh_builder_name(static_cast<BvhBuilder>(h.bvh_builder))},
                {"position_bits", h.position_bits},
                {"position_step", h.position_step},
                {"position_error", h.position_error},

@@ -13,6 +13,7 @@
 #include "engine/effects.h"
 #include "engine/film.h"
 #include "engine/process_memory.h"
+#include "treelets/bvh_builder_kind.h"
 
 namespace shoal {
 namespace {
@@ -284,6 +285,7 @@ std::string stats_json(const RenderResult& result, const Scene& scene, const Pic
                    {"treelets_count", scene.treelets.size()},
                    {"instances_count", scene.top_tree.instance_count()},
                    {"geometry_bytes", scene.header.geometry_bytes},
+                   {"builder", bvh_builder_name(static_cast<BvhBuilder>(scene.header.bvh_builder))},
                    {"position_bits", scene.header.position_bits},
                    {"position_step", scene.header.position_step},
                    {"position_error", scene.header.position_error},

@@ -48,7 +48,7 @@ struct SceneHeader {
   uint32_t position_bits = 0;        ///< PositionPrecision (engine/position_grid.h)
   float position_step = 0;           ///< of the coarsest grid; 0: no position was rounded
   float position_error = 0;          ///< how far a point was moved at most, world
-  uint32_t reserved[1] = {};
+  uint32_t bvh_builder = 0;          ///< BvhBuilder (treelets/bvh_builder_kind.h)
 };
 static_assert(sizeof(SceneHeader) == 112);
 

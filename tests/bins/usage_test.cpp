@@ -21,7 +21,7 @@ void expect_usage(const ProgramRun& run, const std::vector<std::string>& parts) 
 TEST(Usage, HelpOfEverySubcommandExitsZeroAndPrintsItsOptions) {
   const TemporaryFolder folder;
   const std::map<std::string, std::vector<std::string>> expected = {
-      {"build", {"--output", "--positions", "exact, 21, 16", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
+      {"build", {"--output", "--positions", "exact, 21, 16", "--builder", "sah, lbvh, karras", "--treelet-size", "--max-memory", "--threads", "--time", "--animation"}},
       {"render", {"--output",  "--width",      "--height",         "--spp",       "--bounces",
                   "--seed",    "--camera",     "--environment",    "--threads",   "--max-memory",
                   "--environment-rotation",    "--environment-intensity",

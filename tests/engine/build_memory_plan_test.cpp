@@ -63,6 +63,17 @@ TEST(BuildMemoryPlan, ChunksDependOnTheCapAndNotOnTheThreads) {
   }
 }
 
+TEST(BuildMemoryPlan, BuildersThatTakeMoreGetSmallerChunks) {
+  BuildMemoryNeeds needs = needs_of(200'000'000);
+  const auto sah = plan_build_memory(needs, 330 * kMiB, "scene.gltf");
+  needs.builder = BvhBuilder::kKarras;
+  const auto karras = plan_build_memory(needs, 330 * kMiB, "scene.gltf");
+  ASSERT_TRUE(sah.ok() && karras.ok());
+  expect_within_cap(karras.value());
+  EXPECT_LT(karras.value().chunk_triangles({}), sah.value().chunk_triangles({}));
+  EXPECT_LE(karras.value().chunk_triangles({}) * forest_bytes(1, {}, needs.builder), karras.value().chunk_bytes);
+}
+
 TEST(BuildMemoryPlan, ABillionTrianglesFitAQuarterOfTheirBytes) {
   const auto plan = plan_build_memory(needs_of(1'000'000'000), 6'600'000'000ull / 4, "scene.gltf");
   ASSERT_TRUE(plan.ok()) << plan.error().message;

@@ -125,6 +125,7 @@ TEST_F(OpenScene, RefusesWhatWouldBeReadOutsideItsTable) {
       {"header", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->version = 99; }},
       {"precision", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->position_bits = 17; }},
       {"precision", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->position_error = NAN; }},
+      {"builder", [](OpenedFile& f) { f.rows<SceneHeader>(tables::kSceneHeader)->bvh_builder = 3; }},
       {"two headers", [](OpenedFile& f) { f.tables[tables::kSceneHeader].resize(2 * sizeof(SceneHeader)); }},
       {"half a row", [](OpenedFile& f) { f.tables[tables::kMaterials].resize(10); }},
       {"no table", [](OpenedFile& f) { f.tables.erase(tables::kEmitters); }},
