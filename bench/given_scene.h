@@ -1,11 +1,11 @@
-// The scene that a program is asked to trace: a .shoal as it is, a glTF that is built first, or a terrain that is made.
-// Called by bench/against_embree and bench/cache_traffic.
+// The scene that a program is asked to trace: a .shoal as it is, a glTF that is built first, or a scene that is generated.
+// Called by bench/against_embree, bench/cache_traffic and bench/visibility.
 #pragma once
 
 #include <filesystem>
 #include <string>
 
-#include "io/result.h"
+#include "engine/build_scene.h"
 
 namespace shoal::bench {
 
@@ -25,13 +25,14 @@ class WorkFolder {
 };
 
 struct GivenScene {
-  std::string path;               ///< .shoal, .gltf or .glb; empty: a terrain
-  uint64_t triangles = 1'000'000;  ///< of the terrain
+  std::string path;               ///< .shoal, .gltf or .glb; empty: it is generated
+  uint64_t triangles = 1'000'000;  ///< of the generated scene
+  std::string kind = "terrain";    ///< of the generated scene
 
-  std::string name() const { return path.empty() ? "terrain" : std::filesystem::path(path).stem().string(); }
+  std::string name() const { return path.empty() ? kind : std::filesystem::path(path).stem().string(); }
 };
 
 /// The .shoal to trace: as it was given, or made in `folder`. Fails with: as generate_scene(), build_scene().
-Result<std::string> scene_file(const GivenScene& scene, const WorkFolder& folder);
+Result<std::string> scene_file(const GivenScene& scene, const WorkFolder& folder, const SceneBuildOptions& build = {});
 
 }  // namespace shoal::bench

@@ -66,23 +66,6 @@ class VertexTable {
   LargeVector<float>& vertices_;
 };
 
-/// Treelets below `node`, each once, ascending.
-std::vector<TreeletId> treelets_below(const TopTree& tree, uint32_t node) {
-  std::vector<TreeletId> found;
-  std::vector<uint32_t> open{node};
-  while (!open.empty()) {
-    const TopNode& top = tree.nodes()[open.back()];
-    open.pop_back();
-    for (int slot = 0; slot < 8; ++slot) {
-      if (top.kind[slot] == ChildKind::kNode) open.push_back(top.child[slot]);
-      if (top.kind[slot] == ChildKind::kEntry) found.push_back(tree.entry(top.child[slot]).treelet);
-    }
-  }
-  std::sort(found.begin(), found.end());
-  found.erase(std::unique(found.begin(), found.end()), found.end());
-  return found;
-}
-
 void append_triangles(const TreeletView& view, const Instance& instance, VertexTable& vertices, WorldMesh& mesh) {
   for (uint32_t offset = 0; offset < view.header->leaves_bytes;) {
     const LeafView leaf = view.leaf(offset / 4);
@@ -118,6 +101,22 @@ Result<MemoryScene> load_into_memory(const std::string& path) {
     next += room_of(record);
   }
   return memory;
+}
+
+std::vector<TreeletId> treelets_below(const TopTree& tree, uint32_t node) {
+  std::vector<TreeletId> found;
+  std::vector<uint32_t> open{node};
+  while (!open.empty()) {
+    const TopNode& top = tree.nodes()[open.back()];
+    open.pop_back();
+    for (int slot = 0; slot < 8; ++slot) {
+      if (top.kind[slot] == ChildKind::kNode) open.push_back(top.child[slot]);
+      if (top.kind[slot] == ChildKind::kEntry) found.push_back(tree.entry(top.child[slot]).treelet);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
 }
 
 uint32_t WorldMesh::instance_of(uint64_t triangle) const {

@@ -25,6 +25,9 @@ struct MemoryScene {
 /// Fails with: kInput, kCorrupt, kStorage.
 Result<MemoryScene> load_into_memory(const std::string& path);
 
+/// Treelets below `node`, each once, ascending.
+std::vector<TreeletId> treelets_below(const TopTree& tree, uint32_t node);
+
 /// Vertices with the same bits are stored once.
 struct WorldMesh {
   struct InstanceStart {
