@@ -53,7 +53,7 @@ std::string number_text(double value, Shown shown) {
     case Shown::kBytes: return format_bytes(static_cast<uint64_t>(value));
     case Shown::kSeconds: return fmt::format("{:.2f} s", value);
     case Shown::kShare: return fmt::format("{:.2f} %", 100 * value);
-    case Shown::kNumber: return fmt::format("{:.4g}", value);
+    case Shown::kNumber: return value < 1000 ? fmt::format("{:.4g}", value) : fmt::format("{:.0f}", value);
   }
   return "";
 }
@@ -201,7 +201,7 @@ ReportSection effects_section(const Json& json) {
   ReportSection section{"The effects plan", {}};
   if (json["orders"].empty()) return section;
   const Json effects = json["orders"].front().value("effects", Json::array());
-  ReportTable table{{"effect", "of", "", "called for by", "", "first"},
+  ReportTable table{{"effect", "of", "state", "called for by", "callers", "first of them"},
                     {},
                     "What nothing calls for is not evaluated and has no table. Forced: by --effects."};
   for (const Json& effect : effects) {

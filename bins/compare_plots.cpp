@@ -31,6 +31,7 @@ ReportPlot line_plot(const Json& json, const std::string& title, const std::stri
                      const std::function<bool(const Json&)>& shown) {
   ReportPlot plot{title, "seconds", label, false, false, {}};
   plot.y_bytes = bytes;
+  plot.half = true;
   for (const auto& [order_label, order] : json["orders"].items()) {
     if (!order.contains("timeline") || !order["timeline"].contains(column) || !shown(order["timeline"])) continue;
     ReportSeries series{order_label, order["timeline"]["seconds"], order["timeline"][column], {}, true, false};
@@ -94,7 +95,7 @@ ReportSection traffic_section(const std::string& text) {
       }
       const double value = traffic[level]["bytes_per_ray"];
       meaning = traffic[level].value("meaning", "");
-      row.cells.push_back({fmt::format("{:.4g}", value), value,
+      row.cells.push_back({value < 1000 ? fmt::format("{:.4g}", value) : fmt::format("{:.0f}", value), value,
                            fmt::format("/orders/{}/traffic/{}/bytes_per_ray", escaped(label), escaped(level))});
     }
     row.cells.push_back({meaning});
@@ -189,11 +190,11 @@ ReportSection heat_section(const std::string& text) {
                             heat[measure.column], end});
     }
     if (block.maps.empty()) return section;
-    block.caption = fmt::format("How often treelets were {}. {} a square, row by row in the order in which they lie in the file, "
-                                "where neighbours in the scene lie close; logarithmic, one scale for all orders. The colour of "
-                                "the page: never.",
-                                measure.title, block.maps[0].items_a_cell == 1 ? std::string("One")
-                                                                               : fmt::format("{}", block.maps[0].items_a_cell));
+    block.caption = fmt::format("How often treelets were {}. Each square is {}, row by row as they lie in the file, where "
+                                "neighbours in the scene lie close; logarithmic, one scale for all orders. A square in the colour "
+                                "of table heads: never.",
+                                measure.title, block.maps[0].items_a_cell == 1 ? std::string("a treelet")
+                                                                : fmt::format("{} treelets", block.maps[0].items_a_cell));
     section.blocks.emplace_back(std::move(block));
   }
   return section;

@@ -16,6 +16,9 @@ constexpr const char* kNoPlots =
     "This plot needs the library uPlot, which was not at hand when the program was built (npm and a network, then configure "
     "again). Its numbers are in the table.";
 
+/// Longer texts in tables stand on the left, as sentences do, shorter ones on the right, as numbers do.
+constexpr size_t kLongestOnTheRight = 16;
+
 /// JSON may hold "</script>" and "<!--" in strings, which would end the element early.
 std::string in_script(const std::string& json) {
   std::string out;
@@ -54,7 +57,8 @@ struct Writer {
     for (const ReportTable::Row& row : block.rows) {
       html += row.marked ? "<tr class=\"marked\">" : "<tr>";
       for (const ReportCell& cell : row.cells) {
-        html += "<td";
+        const bool words = &cell != &row.cells.front() && !cell.value && cell.text.size() > kLongestOnTheRight;
+        html += words ? "<td class=\"text\"" : "<td";
         if (cell.value) html += fmt::format(" data-value=\"{}\"", *cell.value);
         if (!cell.path.empty()) html += fmt::format(" data-path=\"{}\"", html_escape(cell.path));
         html += fmt::format(">{}</td>", html_escape(cell.text));
@@ -81,7 +85,7 @@ struct Writer {
       }
       if (!one["x"].empty()) spec["series"].push_back(one);
     }
-    html += fmt::format("<figure class=\"plot\" data-points=\"{}\"><h3>{}</h3>\n<div class=\"place\">{}</div>\n", points,
+    html += fmt::format("<figure class=\"plot{}\" data-points=\"{}\"><h3>{}</h3>\n<div class=\"place\">{}</div>\n", plot.half ? " half" : "", points,
                         html_escape(plot.title),
                         report_has_plots() ? "" : fmt::format("<p class=\"missing\">{}</p>", kNoPlots));
     html += fmt::format("<script type=\"application/json\">{}</script></figure>\n", in_script(dump(spec)));

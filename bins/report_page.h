@@ -59,6 +59,7 @@ struct ReportPlot {
   std::vector<std::string> groups = {};
   bool stacked = false;
   bool y_bytes = false;  ///< y is shown with binary units
+  bool half = false;     ///< half as wide as the page: two stand beside each other
 };
 
 /// How much there is of something in each treelet or cell of neighbours, as squares in the order of the file.

@@ -74,8 +74,8 @@
       axes: [Object.assign(x, { splits: () => centers, grid: { show: false }, ticks: { show: false },
                                 values: () => spec.groups.map((name) => (narrow ? name.replace(/ /g, '\n') : name)) }), y],
       series: [{ label: spec.x }].concat(order.map((s) => ({
-        label: spec.series[s].label, stroke: report.color('series-' + (s % 8 + 1)),
-        fill: report.color('series-' + (s % 8 + 1)), width: 0, points: { show: false },
+        label: spec.series[s].label, stroke: report.color('series-' + (s % 10 + 1)),
+        fill: report.color('series-' + (s % 10 + 1)), width: 0, points: { show: false },
         paths: uPlot.paths.bars({ size: [spec.stacked ? 0.6 : 0.92, 140] }),
       }))),
       hooks: { draw: [(plot) => write(plot, spec, placed)] },

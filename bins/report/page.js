@@ -10,6 +10,10 @@
   const color = (name) => getComputedStyle(root).getPropertyValue('--' + name).trim();
   const number = (value) => {
     const size = Math.abs(value);
+    if (size >= 1e5 && size < 1e14) {
+      const power = Math.floor(Math.log10(size) / 3);
+      return Number((value / Math.pow(1000, power)).toPrecision(3)) + ['', ' k', ' M', ' G', ' T'][power];
+    }
     if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(2).replace('e+', 'e');
     return String(Number(value.toPrecision(3)));
   };

@@ -70,14 +70,14 @@
   function draw(figure) {
     const spec = figure.spec, { data, points } = aligned(spec.series);
     const options = {
-      width: figure.place.clientWidth, height: Math.max(320, Math.min(520, figure.place.clientWidth * 0.55)),
+      width: figure.place.clientWidth, height: figure.element.classList.contains('half') ? 250 : Math.max(320, Math.min(520, figure.place.clientWidth * 0.55)),
       cursor: { drag: { x: false, y: false }, points: { show: false }, x: false, y: false },
       legend: { live: false },
       scales: { x: { time: false, distr: spec.logX ? 3 : 1, range: range(spec.logX) },
                 y: { distr: spec.logY ? 3 : 1, range: range(spec.logY) } },
       axes: [axis(spec.x, spec.logX, 30), axis(spec.y, spec.logY, spec.bytes ? 74 : 62, spec.bytes)],
       series: [{ label: spec.x }].concat(spec.series.map((one, s) => {
-        const stroke = one.front ? color('ink') : color('series-' + (s % 8 + 1));
+        const stroke = one.front ? color('ink') : color('series-' + (s % 10 + 1));
         return {
           label: one.label, stroke, width: one.front || !one.dots ? 1.5 : one.line ? 2 : 0, dash: one.front ? [4, 4] : undefined,
           spanGaps: true, paths: one.line ? undefined : () => null,

@@ -38,11 +38,13 @@ class ComparePage : public ::testing::Test {
     ASSERT_TRUE(json_.is_object());
   }
   bool plots() const { return html_.find("class=\"missing\"") == std::string::npos; }
+  /// The data of every figure of a kind.
   std::vector<json> specs(const std::string& kind) const {
     std::vector<json> found;
-    const std::string pattern = "<figure class=\"" + kind + "\"[\\s\\S]*?<script type=\"application/json\">([^\\n]*)</script></figure>";
-    for (const std::string& text : all_matches(between(html_, "<body>", "<script type=\"application/json\" id=\"data\">"), pattern)) {
-      found.push_back(json::parse(text, nullptr, false));
+    const std::string mark = "<script type=\"application/json\">", begin = "<figure class=\"" + kind;
+    for (size_t at = html_.find(begin); at != std::string::npos; at = html_.find(begin, at + 1)) {
+      const size_t start = html_.find(mark, at) + mark.size();
+      found.push_back(json::parse(html_.substr(start, html_.find("</script>", start) - start), nullptr, false));
     }
     return found;
   }
@@ -209,9 +211,9 @@ TEST_F(ComparePage, ABrowserDrawsEveryPlotWithoutAComplaint) {
   ASSERT_THAT(run.out, HasSubstr("</html>")) << run.err;
   EXPECT_THAT(run.err, Not(HasSubstr("CONSOLE"))) << "what the page complained of";
   EXPECT_THAT(all_matches(run.out, "<html[^>]*data-errors=\"([^\"]*)\""), ::testing::IsEmpty());
-  const std::vector<std::string> points = all_matches(run.out, "<figure class=\"plot\"[^>]*data-points=\"([0-9]+)\"");
+  const std::vector<std::string> points = all_matches(run.out, "<figure class=\"plot[^>]*data-points=\"([0-9]+)\"");
   EXPECT_EQ(points.size(), 9u);
-  EXPECT_EQ(all_matches(run.out, "<figure class=\"plot\"[^>]*data-drawn=\"([0-9]+)\""), points);
+  EXPECT_EQ(all_matches(run.out, "<figure class=\"plot[^>]*data-drawn=\"([0-9]+)\""), points);
   const std::vector<std::string> cells = all_matches(run.out, "<figure class=\"heat\"[^>]*data-cells=\"([0-9]+)\"");
   EXPECT_EQ(all_matches(run.out, "<figure class=\"heat\"[^>]*data-drawn=\"([0-9]+)\""), cells);
   const std::vector<std::string> colors = all_matches(run.out, "<canvas[^>]*data-colors=\"([0-9]+)\"");
