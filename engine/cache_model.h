@@ -145,6 +145,7 @@ class CacheModel {
 
   /// The program reads, or writes, bytes from `address` on, data of `kind` (below kMaxKinds).
   void touch(uint64_t address, uint64_t bytes, bool write, uint8_t kind) {
+    if (bytes == 0) return;
     const uint64_t last = (address + bytes - 1) >> line_bits_;
     for (uint64_t line = address >> line_bits_; line <= last; ++line) {
       if (line == newest_ && (!write || newest_dirty_)) {  // it is the newest, and stays so

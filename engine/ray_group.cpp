@@ -3,6 +3,15 @@
 #include "treelets/trace_touching.h"
 
 namespace shoal {
+namespace {
+
+/// Of a ray in the group: where it stands, and what it took.
+void touch_member(const GroupRay& member, TouchLog& touches) {
+  touches.write(member.page, TouchKind::kInHand);
+  touches.write(member.triangle_tests, TouchKind::kInHand);
+}
+
+}  // namespace
 
 void RayGroup::address(const TopTree& tree, TouchLog* touches) {
   NextJob jobs[kCapacity];
@@ -19,6 +28,9 @@ void RayGroup::address(const TopTree& tree, TouchLog* touches) {
   if (touches == nullptr) {
     tree.next({jobs, count});
   } else {
+    for (uint32_t i = 0; i < size_; ++i) touch_member(rays_[slot_[i]], *touches);
+    touches->write(jobs, count * sizeof(NextJob), TouchKind::kInHand);
+    touches->write(entry_, sizeof entry_, TouchKind::kInHand);
     next_entries_touching(tree, {jobs, count}, *touches);
   }
   for (uint32_t k = 0; k < count; ++k) {
@@ -42,7 +54,9 @@ uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleT
   if (touches == nullptr) {
     trace_treelets({jobs, size_}, counters, test, loop);
   } else {
+    touches->write(jobs, size_ * sizeof(TraceJob), TouchKind::kInHand);
     trace_treelets_touching({jobs, size_}, counters, *touches);
+    for (uint32_t i = 0; i < size_; ++i) touch_member(rays_[slot_[i]], *touches);
   }
   for (uint32_t i = 0; i < size_; ++i) {
     GroupRay& member = rays_[slot_[i]];

@@ -125,6 +125,7 @@ class QueuedWorker final : public UnfinishedPaths {
 
   /// Rays are copied from their block to this thread's.
   void touch_block(std::span<const Ray> rays) {
+    if (rays.empty()) return;
     worker_.touches()->read(rays.data(), rays.size_bytes(), TouchKind::kQueues);
     worker_.touches()->write(block_.rays, rays.size_bytes(), TouchKind::kQueues);
   }
