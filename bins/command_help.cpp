@@ -1,5 +1,5 @@
-// shoal help: what the build writes the manual page and the completions of shells with; not among the commands that --help
-// names. Without options it prints the help.
+// shoal help: what the build writes the manual page and the completions of shells with; not among the commands that
+// --help names. Without options it prints the help.
 #include <fmt/format.h>
 
 #include <memory>
@@ -34,7 +34,8 @@ int run_help(const Arguments& arguments, CLI::App& app, Console& console) {
   } else if (arguments.shell.empty()) {
     fmt::print("{}", app.help("", CLI::AppFormatMode::Normal));
   } else {
-    return console.error({ErrorCode::kUsage, fmt::format("--completion {}: expected bash or zsh", arguments.shell)});
+    return console.error(
+        {ErrorCode::kUsage, fmt::format("--completion {}: expected bash or zsh", arguments.shell)});
   }
   return 0;
 }

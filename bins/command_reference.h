@@ -1,11 +1,10 @@
-// All that the program can be asked, as data: what the manual page and the completions of shells are written from, so that
-// neither can differ from the program. Called by bins/command_help. Plain functions.
+// All that the program can be asked, as data: what the manual page and the completions of shells are written from,
+// so that neither can differ from the program. Called by bins/command_help. Plain functions.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
-
-#include <CLI/CLI.hpp>
 
 namespace shoal {
 
@@ -36,7 +35,8 @@ ProgramReference describe_program(const CLI::App& app);
 
 /// The manual page, in roff.
 std::string man_page(const ProgramReference& program);
-/// A script for bash (loaded by bash-completion, or by `source`), and one for zsh (#compdef, in a folder of $fpath).
+/// A script for bash (loaded by bash-completion, or by `source`), and one for zsh (#compdef, in a folder of
+/// $fpath).
 std::string bash_completion(const ProgramReference& program);
 std::string zsh_completion(const ProgramReference& program);
 

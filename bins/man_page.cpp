@@ -13,12 +13,23 @@ std::string escape(const std::string& text) {
     const bool line_begins = i == 0 || text[i - 1] == '\n';
     if (line_begins && (text[i] == '.' || text[i] == '\'')) out += "\\&";
     switch (text[i]) {
-      case '\\': out += "\\e"; break;
-      case '-': out += "\\-"; break;
-      case '~': out += "\\(ti"; break;
-      case '^': out += "\\(ha"; break;
-      case '`': out += "\\(ga"; break;
-      default: out += text[i];
+      case '\\':
+        out += "\\e";
+        break;
+      case '-':
+        out += "\\-";
+        break;
+      case '~':
+        out += "\\(ti";
+        break;
+      case '^':
+        out += "\\(ha";
+        break;
+      case '`':
+        out += "\\(ga";
+        break;
+      default:
+        out += text[i];
     }
   }
   return out;
@@ -107,12 +118,14 @@ std::string command_section(const CommandReference& command) {
 }  // namespace
 
 std::string man_page(const ProgramReference& program) {
-  std::string text = fmt::format(".\\\" Written by the program itself: shoal help --man\n"
-                                 ".TH SHOAL 1 \"\" \"Shoal {}\" \"User Commands\"\n.nh\n.ad l\n"
-                                 ".SH NAME\nshoal \\- render glTF scenes bigger than memory\n.SH SYNOPSIS\n",
-                                 SHOAL_VERSION);
+  std::string text = fmt::format(
+      ".\\\" Written by the program itself: shoal help --man\n"
+      ".TH SHOAL 1 \"\" \"Shoal {}\" \"User Commands\"\n.nh\n.ad l\n"
+      ".SH NAME\nshoal \\- render glTF scenes bigger than memory\n.SH SYNOPSIS\n",
+      SHOAL_VERSION);
   for (const CommandReference& command : program.commands) text += usage(command) + "\n.br\n";
-  text += bold("shoal --version") + "\n.br\n" + bold("shoal") + " " + italic("command") + " " + bold("--help") + "\n";
+  text +=
+      bold("shoal --version") + "\n.br\n" + bold("shoal") + " " + italic("command") + " " + bold("--help") + "\n";
   text += kDescription;
   text += ".SH COMMANDS\n";
   for (const CommandReference& command : program.commands) text += command_section(command);

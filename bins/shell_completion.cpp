@@ -20,7 +20,8 @@ std::string summary(const std::string& description) {
 
 // ---- bash
 
-constexpr const char* kBashHead = R"(# bash completion for shoal: written by the program itself (shoal help --completion bash)
+constexpr const char* kBashHead =
+    R"(# bash completion for shoal: written by the program itself (shoal help --completion bash)
 
 # Prints the words that may begin with a dash after a command.
 _shoal_options() {
@@ -148,7 +149,8 @@ std::string zsh_action(const OptionReference& option) {
 }
 
 std::string zsh_option(const OptionReference& option) {
-  if (option.positional) return fmt::format("            '{}{}' \\\n", option.repeats ? "*" : "", zsh_action(option));
+  if (option.positional)
+    return fmt::format("            '{}{}' \\\n", option.repeats ? "*" : "", zsh_action(option));
   std::string lines;
   for (const std::string& name : option.names) {
     const bool stays = !option.value.empty() && option.names.size() == 1;  // may be given again, to no harm

@@ -25,8 +25,8 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
   return found;
 }
 
-const std::vector<std::string> kCommands = {"build",    "render", "batch",  "compare", "accuracy",
-                                            "info",     "verify", "diff",   "generate"};
+const std::vector<std::string> kCommands = {"build", "render", "batch", "compare", "accuracy",
+                                            "info",  "verify", "diff",  "generate"};
 
 /// Long names of options, as --help prints them.
 std::set<std::string> options_of(const TemporaryFolder& folder, const std::string& command) {
@@ -53,7 +53,8 @@ TEST(HelpPages, TheManualNamesEveryCommandAndOption) {
     const std::string section = manual.substr(begin, manual.find(".S", begin + 3) - begin);
     const std::set<std::string> options = options_of(folder, command);
     EXPECT_GE(options.size(), 4u);
-    for (const std::string& option : options) EXPECT_THAT(section, HasSubstr("\\fB" + escaped(option) + "\\fR")) << command;
+    for (const std::string& option : options)
+      EXPECT_THAT(section, HasSubstr("\\fB" + escaped(option) + "\\fR")) << command;
   }
   EXPECT_THAT(manual, HasSubstr("a corrupt .shoal file"));
 }
@@ -74,8 +75,8 @@ std::vector<std::string> bash_offers(const TemporaryFolder& folder, const std::v
   std::string line;
   for (const std::string& word : words) line += " '" + word + "'";
   put_file(folder / "complete.sh", page(folder, {"--completion", "bash"}));
-  put_file(folder / "ask.sh", "set -u\nsource ./complete.sh\nCOMP_WORDS=(" + line + " )\nCOMP_CWORD=" +
-                                  std::to_string(words.size() - 1) +
+  put_file(folder / "ask.sh", "set -u\nsource ./complete.sh\nCOMP_WORDS=(" + line +
+                                  " )\nCOMP_CWORD=" + std::to_string(words.size() - 1) +
                                   "\n_shoal\n[ ${#COMPREPLY[@]} -eq 0 ] || printf '%s\\n' \"${COMPREPLY[@]}\"\n");
   const ProgramRun run = run_shell(folder, "bash ask.sh");
   expect_exit(run, 0);

@@ -1,5 +1,5 @@
-// Whatever call of the file layer fails while a batch runs: it goes on or ends with the right code, leaves no half file and
-// no temporary, vouches for no picture that is not there, and the next batch makes up for it.
+// Whatever call of the file layer fails while a batch runs: it goes on or ends with the right code, leaves no half
+// file and no temporary, vouches for no picture that is not there, and the next batch makes up for it.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -54,7 +54,8 @@ class BadLuckBatch : public ::testing::Test {
     put(folder_ / "bin/stats.json", kStats);
     const std::vector<uint8_t> rgb(48, 100);
     ASSERT_TRUE(write_png(posix_file_system(), folder_ / "bin/picture.png", 4, 4, rgb).ok());
-    put(folder_ / "scenes/a.gltf", R"({"asset": {"version": "2.0"}, "buffers": [{"uri": "a.bin", "byteLength": 4}]})");
+    put(folder_ / "scenes/a.gltf",
+        R"({"asset": {"version": "2.0"}, "buffers": [{"uri": "a.bin", "byteLength": 4}]})");
     put(folder_ / "scenes/a.bin", "abcd");
     put(folder_ / "scenes/deep/b.shoal", "not looked into");
     options_.folder = folder_ / "scenes";
@@ -71,7 +72,8 @@ class BadLuckBatch : public ::testing::Test {
   /// What must hold whenever no batch is at work.
   void expect_whole_files(const std::string& when) {
     std::error_code error;
-    for (stdfs::recursive_directory_iterator at(options_.out, error), end; !error && at != end; at.increment(error)) {
+    for (stdfs::recursive_directory_iterator at(options_.out, error), end; !error && at != end;
+         at.increment(error)) {
       const std::string path = at->path().string(), name = at->path().filename().string();
       EXPECT_EQ(name.find(".tmp-"), std::string::npos) << when << " left " << path;
       EXPECT_TRUE(!path.ends_with(".json") || nlohmann::json::accept(text_of(path))) << when << ": " << path;
@@ -89,7 +91,8 @@ class BadLuckBatch : public ::testing::Test {
   uint64_t harm_every_call(Fault fault) {
     FaultyFileSystem fs(posix_file_system());
     for (uint64_t call = 0;; ++call) {
-      const std::string when = "fault " + std::to_string(static_cast<int>(fault)) + " at call " + std::to_string(call);
+      const std::string when =
+          "fault " + std::to_string(static_cast<int>(fault)) + " at call " + std::to_string(call);
       stdfs::remove_all(options_.out);
       fs.arm(fault, call);
       const auto harmed = run(fs);
@@ -107,7 +110,8 @@ class BadLuckBatch : public ::testing::Test {
       const auto next = run(fs);
       EXPECT_TRUE(next.ok() && next.value().counts.done + next.value().counts.skipped == 2) << when;
       expect_whole_files(when + ", then another batch");
-      for (const char* picture : {"/a.exr", "/deep/b.exr"}) EXPECT_EQ(text_of(options_.out + picture), "a picture") << when;
+      for (const char* picture : {"/a.exr", "/deep/b.exr"})
+        EXPECT_EQ(text_of(options_.out + picture), "a picture") << when;
       if (HasFailure()) return call;
     }
   }

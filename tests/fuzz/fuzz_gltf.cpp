@@ -11,7 +11,7 @@
 namespace shoal::fuzz {
 namespace {
 
-constexpr uint64_t kMostElements = 4096;  // of an accessor at once: crosses no budget and every check
+constexpr uint64_t kMostElements = 4096;      // of an accessor at once: crosses no budget and every check
 constexpr uint64_t kMostDecoded = 16u << 20;  // of compressed meshes: what more takes is refused by the memory plan
 
 std::string put_document(MemoryFileSystem& fs, const std::vector<std::byte>& bytes) {

@@ -1,5 +1,6 @@
-// .shoal files from strangers (tests/fuzz/shoal_input.h says how inputs stand for them): container, tables and pages are
-// checked as they are for users, and rays go through whatever passes: what the checks let through must be safe to trace.
+// .shoal files from strangers (tests/fuzz/shoal_input.h says how inputs stand for them): container, tables and
+// pages are checked as they are for users, and rays go through whatever passes: what the checks let through must be
+// safe to trace.
 #include <algorithm>
 #include <memory>
 #include <random>
@@ -39,7 +40,8 @@ Pages read_pages(const Scene& scene) {
     std::vector<Line> page((record.raw_bytes + 127ull) / 64);
     uint64_t read_bytes = 0;
     const std::span<std::byte> bytes(page.front().bytes, record.raw_bytes);
-    if (!scene.file->read_page(record.id, bytes, &read_bytes).ok() || !check_page(scene, record, bytes).ok()) continue;
+    if (!scene.file->read_page(record.id, bytes, &read_bytes).ok() || !check_page(scene, record, bytes).ok())
+      continue;
     pages.lines[record.id] = std::move(page);
   }
   for (const TreeletPages& t : scene.treelets) {

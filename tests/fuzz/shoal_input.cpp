@@ -77,7 +77,8 @@ Bytes file_of_parts(std::span<const std::byte> parts) {
 std::vector<PageRecord> directory_of(const Bytes& bytes, const Footer& footer) {
   const uint64_t end = bytes.size() - sizeof(Footer);
   if (footer.directory_offset > end) return {};
-  const uint64_t count = std::min<uint64_t>(footer.page_count, (end - footer.directory_offset) / sizeof(PageRecord));
+  const uint64_t count =
+      std::min<uint64_t>(footer.page_count, (end - footer.directory_offset) / sizeof(PageRecord));
   std::vector<PageRecord> records(count);
   if (count > 0) std::memcpy(records.data(), bytes.data() + footer.directory_offset, count * sizeof(PageRecord));
   return records;
@@ -126,7 +127,8 @@ Result<std::vector<std::byte>> parts_of(const PageFile& file) {
     SHOAL_RETURN_IF_ERROR(file.read_page(record.id, page, &read_bytes));
     while (page.size() > kWord && page.back() == page[page.size() - 1 - kWord]) page.pop_back();
     if (page.size() > 0xffff || record.raw_bytes > kMostPartBytes) {
-      return Error{ErrorCode::kInput, fmt::format("page {} of {} bytes is too large for a part", record.id, page.size())};
+      return Error{ErrorCode::kInput,
+                   fmt::format("page {} of {} bytes is too large for a part", record.id, page.size())};
     }
     const PartHead head{static_cast<uint8_t>(record.kind), static_cast<uint8_t>(record.table),
                         static_cast<uint16_t>(page.size()), record.raw_bytes};

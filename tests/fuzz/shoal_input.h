@@ -1,10 +1,10 @@
-// .shoal files as fuzzers like them. A paged file is mostly padding, and every byte of it is under a checksum: mutations
-// of it are refused at the door. An input is one of
+// .shoal files as fuzzers like them. A paged file is mostly padding, and every byte of it is under a checksum:
+// mutations of it are refused at the door. An input is one of
 //   'S'HOAL...   the file itself
 //   'R' file     the file, whose checksums are made right before it is opened
 //   'P' parts    what the file holds, without padding: a sound container is put around it
-// A part is a PartHead and `stored_bytes` bytes; up to `bytes` it goes on with the last four of them, again and again, as
-// tiles of textures do.
+// A part is a PartHead and `stored_bytes` bytes; up to `bytes` it goes on with the last four of them, again and
+// again, as tiles of textures do.
 #pragma once
 
 #include <cstddef>

@@ -78,7 +78,8 @@ void write_images(const SeedFolder& folder) {
 }
 
 void write_exrs(const SeedFolder& folder) {
-  const auto put = [&](const std::string& name, const std::vector<std::string>& channels, bool half, uint32_t width) {
+  const auto put = [&](const std::string& name, const std::vector<std::string>& channels, bool half,
+                       uint32_t width) {
     ExrImage image;
     image.width = width;
     image.height = 20;
@@ -138,7 +139,8 @@ GltfScene rich_scene() {
                                {"samplers", {{{"input", times}, {"output", moves}}}}}};
   scene.root["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "red"}}};
   primitives[0]["extensions"]["KHR_materials_variants"]["mappings"] = {{{"material", 0}, {"variants", {0}}}};
-  scene.root["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "spot"}, {"spot", {{"outerConeAngle", 0.5}}}}};
+  scene.root["extensions"]["KHR_lights_punctual"]["lights"] = {
+      {{"type", "spot"}, {"spot", {{"outerConeAngle", 0.5}}}}};
   scene.root["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 0;
   return scene;
 }
@@ -166,8 +168,9 @@ GltfScene meshopt_scene() {
         {{"bufferView", view}, {"type", "SCALAR"}, {"componentType", gltf::kUnsignedInt}, {"count", 6}});
     scene.add_mesh({{"attributes", {{"POSITION", 0}}}, {"indices", accessor}});
   }
-  scene.root["buffers"] = {{{"uri", "scene.bin"}, {"byteLength", scene.binary.size()}},
-                           {{"byteLength", 4096}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
+  scene.root["buffers"] = {
+      {{"uri", "scene.bin"}, {"byteLength", scene.binary.size()}},
+      {{"byteLength", 4096}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
   scene.root["extensionsRequired"] = {"EXT_meshopt_compression"};
   return scene;
 }
@@ -266,14 +269,20 @@ testing::WrittenScene full_scene(MemoryFileSystem& fs) {
 }
 
 void write_shoals(const SeedFolder& folder) {
-  const auto put = [&](const std::string& name, const auto& change, const SceneBuildOptions& options, bool as_file) {
+  const auto put = [&](const std::string& name, const auto& change, const SceneBuildOptions& options,
+                       bool as_file) {
     MemoryFileSystem fs;
     testing::WrittenScene scene;
     change(fs, scene);
     scene.save(fs);
     put_built(folder, fs, name, options, as_file);
   };
-  put("triangle", [](auto&, auto& scene) { scene.add_node({{"mesh", scene.add_triangle_mesh(0, 1)}}); }, {}, true);
+  put(
+      "triangle",
+      [](auto&, auto& scene) {
+        scene.add_node({{"mesh", scene.add_triangle_mesh(0, 1)}});
+      },
+      {}, true);
   const auto full = [](auto& fs, auto& scene) { scene = full_scene(fs); };
   put("full", full, {}, false);
   SceneBuildOptions coarse;
@@ -285,8 +294,9 @@ void write_shoals(const SeedFolder& folder) {
     scene.add_node({{"mesh", scene.add_triangle_mesh(0, 1)}});
     scene.add_node({{"mesh", scene.add_triangle_mesh(5, 1)}});
     const uint32_t times = scene.add_floats(1, {0, 4}), values = scene.add_floats(3, {0, 0, 0, 8, 0, 0});
-    scene.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
-                                 {"samplers", {{{"input", times}, {"output", values}}}}}};
+    scene.json["animations"] = {
+        {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+         {"samplers", {{{"input", times}, {"output", values}}}}}};
   };
   put("moving", moves, moving, false);
 }

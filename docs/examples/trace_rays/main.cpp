@@ -1,14 +1,14 @@
-// Looks at a scene from above: a ray down for each cell of a grid over it, then from each hit a ray back up that asks
-// whether anything is in the way. Prints what was hit and what it took to find out.
-// Usage: trace_rays SCENE.shoal [CELLS_A_SIDE [MAX_MEMORY_MIB]]
+// Looks at a scene from above: a ray down for each cell of a grid over it, then from each hit a ray back up that
+// asks whether anything is in the way. Prints what was hit and what it took to find out. Usage: trace_rays
+// SCENE.shoal [CELLS_A_SIDE [MAX_MEMORY_MIB]]
+#include <shoal/tracer.h>
+
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <span>
 #include <string>
 #include <vector>
-
-#include <shoal/tracer.h>
 
 namespace {
 
@@ -59,7 +59,8 @@ std::vector<Ray> rays_back(std::span<const Ray> rays, std::span<const Hit> hits)
 void print(const char* name, const TraceReport& report) {
   std::printf("%s: %llu rays, %llu hits, %llu treelets visited, %llu pages and %llu bytes read\n", name,
               static_cast<unsigned long long>(report.rays), static_cast<unsigned long long>(report.hits),
-              static_cast<unsigned long long>(report.treelet_visits), static_cast<unsigned long long>(report.page_loads),
+              static_cast<unsigned long long>(report.treelet_visits),
+              static_cast<unsigned long long>(report.page_loads),
               static_cast<unsigned long long>(report.disk_read_bytes));
 }
 
@@ -89,8 +90,9 @@ int main(int argc, char** argv) {
   print("closest hit", closest.value());
   for (size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].hit) continue;
-    std::printf("first: triangle %u of instance %u at t = %g, u = %g, v = %g\n", hits[i].primitive, hits[i].instance,
-                static_cast<double>(hits[i].t), static_cast<double>(hits[i].u), static_cast<double>(hits[i].v));
+    std::printf("first: triangle %u of instance %u at t = %g, u = %g, v = %g\n", hits[i].primitive,
+                hits[i].instance, static_cast<double>(hits[i].t), static_cast<double>(hits[i].u),
+                static_cast<double>(hits[i].v));
     break;
   }
 
