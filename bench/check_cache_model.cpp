@@ -75,7 +75,7 @@ class Passes {
       if (group_.size() == 0) return;
       group_.address(scene_.top_tree(), touches_);
       group_.send(scene_.top_tree(), decide);
-      group_.trace(scene_.top_tree(), counters_, TriangleTest::kWatertight, touches_);
+      group_.trace(scene_.top_tree(), counters_, TriangleTest::kWatertight, InnerLoop::kMoreNumerous, touches_);
     }
   }
 

@@ -291,7 +291,7 @@ PagePin RenderWorker::pin(TreeletId treelet) {
     context_.fail(std::move(pin).error());
     return {};
   }
-  if (touches_ != nullptr && cache_counters_.decoded_bytes != decoded_before) [[unlikely]] {
+  if (touches_ != nullptr && cache_counters_.decoded_bytes != decoded) [[unlikely]] {
     const std::span<const std::byte> page = pin.value().bytes();
     touches_->write(page.data(), page.size(), TouchKind::kPages);
   }
