@@ -36,16 +36,20 @@ bool is_there(const std::string& path) {
 }  // namespace
 
 void CheckpointArguments::declare(CLI::App& app) {
-  app.add_option("--checkpoint", when,
-                 "when the render is written to PICTURE.checkpoint, from which --resume goes on: on-stop (by SIGTERM or "
-                 "SIGINT, which end it with code 9), every=TIME such as every=10m (and on-stop), never; docs/checkpoints.md")
+  app.add_option(
+         "--checkpoint", when,
+         "when the render is written to PICTURE.checkpoint, from which --resume goes on: on-stop (by SIGTERM or "
+         "SIGINT, which end it with code 9), every=TIME such as every=10m (and on-stop), never; "
+         "docs/checkpoints.md")
       ->type_name("WHEN")
       ->capture_default_str();
-  app.add_flag("--resume", resume,
-               "go on from PICTURE.checkpoint, to the same bits; without one start afresh. Order, memory and threads may be "
-               "others, --spp more");
+  app.add_flag(
+      "--resume", resume,
+      "go on from PICTURE.checkpoint, to the same bits; without one start afresh. Order, memory and threads may be "
+      "others, --spp more");
   app.add_option("--sample-range", range,
-                 "of the samples of every pixel, those from A on, before B: -o is a part of raw sums then, and `shoal merge` "
+                 "of the samples of every pixel, those from A on, before B: -o is a part of raw sums then, and "
+                 "`shoal merge` "
                  "makes a picture of parts")
       ->type_name("A:B");
 }
@@ -82,7 +86,8 @@ Result<SampleSpan> parse_sample_range(const std::string& text) {
 Status check_checkpoint_arguments(const CheckpointArguments& arguments) {
   SHOAL_ASSIGN_OR_RETURN(const When when, parse_when(arguments.when));
   if (arguments.resume && !when.on_stop) {
-    return Error{ErrorCode::kUsage, "--resume with --checkpoint never: what was done before would be lost when it is stopped"};
+    return Error{ErrorCode::kUsage,
+                 "--resume with --checkpoint never: what was done before would be lost when it is stopped"};
   }
   return parse_sample_range(arguments.range).ok() ? Status() : Status(parse_sample_range(arguments.range).error());
 }
@@ -102,8 +107,10 @@ Result<CheckpointOptions> checkpoint_options(const CheckpointArguments& argument
   } else if (arguments.resume) {
     console.info(fmt::format("{}: there is none, the render starts afresh", options.path));
   } else if (there) {
-    console.warning(fmt::format("{} is of a render that was not completed: --resume would go on from it, this one starts "
-                                "afresh", options.path));
+    console.warning(
+        fmt::format("{} is of a render that was not completed: --resume would go on from it, this one starts "
+                    "afresh",
+                    options.path));
   }
   return options;
 }

@@ -2,9 +2,8 @@
 // --checkpoint, --resume, --sample-range. Called by bins/command_render.
 #pragma once
 
-#include <string>
-
 #include <CLI/CLI.hpp>
+#include <string>
 
 #include "bins/console.h"
 #include "engine/checkpoint_options.h"
@@ -25,8 +24,8 @@ Result<double> parse_duration(const std::string& text);
 /// "A:B": the samples from A on, before B; empty: none. Fails with: kUsage.
 Result<SampleSpan> parse_sample_range(const std::string& text);
 
-/// Of a picture that goes to `output`: its checkpoint is `output`.checkpoint. Says whether it goes on from one. Fails with:
-/// kUsage, and as SumsFile::open().
+/// Of a picture that goes to `output`: its checkpoint is `output`.checkpoint. Says whether it goes on from one.
+/// Fails with: kUsage, and as SumsFile::open().
 Result<CheckpointOptions> checkpoint_options(const CheckpointArguments& arguments, const std::string& output,
                                              Console& console);
 /// The same without looking. Fails with: kUsage.

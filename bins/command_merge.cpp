@@ -21,7 +21,8 @@ struct Arguments {
 Status merge(const Arguments& arguments, Console& console) {
   SHOAL_ASSIGN_OR_RETURN(const ToneCurve curve, parse_tone_curve(arguments.tonemap));
   if (!std::isfinite(arguments.exposure)) {
-    return Error{ErrorCode::kUsage, fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
+    return Error{ErrorCode::kUsage,
+                 fmt::format("an exposure of {} stops: must be a finite number", arguments.exposure)};
   }
   for (const std::string& path : {arguments.output, arguments.png}) {
     if (!path.empty()) SHOAL_RETURN_IF_ERROR(check_output(path));
@@ -34,8 +35,8 @@ Status merge(const Arguments& arguments, Console& console) {
                                                     image.channels[2].values, {curve, arguments.exposure});
     SHOAL_RETURN_IF_ERROR(write_png(posix_file_system(), arguments.png, image.width, image.height, rgb));
   }
-  console.info(fmt::format("{} written: {} parts, {} samples a pixel, rendered in {:.2f} s altogether", arguments.output,
-                           arguments.parts.size(), merged.samples, merged.seconds));
+  console.info(fmt::format("{} written: {} parts, {} samples a pixel, rendered in {:.2f} s altogether",
+                           arguments.output, arguments.parts.size(), merged.samples, merged.seconds));
   return {};
 }
 

@@ -36,41 +36,48 @@ Status check_samples(const SumsFile& file, const PictureOptions& picture) {
   const SumsHeader& header = file.header();
   const SampleSpan range = asked_range(picture);
   if (range.begin != header.range.begin) {
-    return Error{ErrorCode::kInput, fmt::format("{} is of samples from {} on, not from {} on", file.path(), header.range.begin,
-                                                range.begin)};
+    return Error{ErrorCode::kInput, fmt::format("{} is of samples from {} on, not from {} on", file.path(),
+                                                header.range.begin, range.begin)};
   }
   if (range.end < header.pass.span.end) {
     return Error{ErrorCode::kUsage,
-                 fmt::format("{} has pixels with {} samples: as many must be asked for at least, found {}", file.path(),
-                             header.pass.span.end, range.end)};
+                 fmt::format("{} has pixels with {} samples: as many must be asked for at least, found {}",
+                             file.path(), header.pass.span.end, range.end)};
   }
   const uint32_t samples = most_samples(picture);
   if (!Sampler::same_numbers(picture.shading.sampler, header.samples, samples, sets_of(picture))) {
-    return Error{ErrorCode::kUsage,
-                 fmt::format("{} is of {} samples a pixel: with --sampler blue-noise only as many as have the same power of two "
-                             "above them can be asked for, found {}", file.path(), header.samples, samples)};
+    return Error{
+        ErrorCode::kUsage,
+        fmt::format(
+            "{} is of {} samples a pixel: with --sampler blue-noise only as many as have the same power of two "
+            "above them can be asked for, found {}",
+            file.path(), header.samples, samples)};
   }
   const bool level = header.pass.span.end == std::min(next_level(header.pass.span.begin), samples);
   if (picture.noise.asked() && samples != header.samples && !level) {
-    return Error{ErrorCode::kUsage,
-                 fmt::format("{} is in the last pass of {} samples at most: with --target-noise there can be more only before, "
-                             "found {}", file.path(), header.samples, samples)};
+    return Error{
+        ErrorCode::kUsage,
+        fmt::format(
+            "{} is in the last pass of {} samples at most: with --target-noise there can be more only before, "
+            "found {}",
+            file.path(), header.samples, samples)};
   }
   return {};
 }
 
 Status check_header(const SumsFile& file, const PictureOptions& picture) {
   const SumsHeader& header = file.header();
-  const bool same = header.width == picture.width && header.height == picture.height && header.aovs == picture.aovs.bits &&
-                    header.is_adaptive() == picture.noise.asked();
+  const bool same = header.width == picture.width && header.height == picture.height &&
+                    header.aovs == picture.aovs.bits && header.is_adaptive() == picture.noise.asked();
   if (same) return {};
-  return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its header is not that of its picture", file.path())};
+  return Error{ErrorCode::kCorrupt,
+               fmt::format("{} is damaged: its header is not that of its picture", file.path())};
 }
 
 }  // namespace
 
-Checkpoints::Checkpoints(FileSystem& fs, const CheckpointOptions& options, std::string identity, const SumsHeader& header,
-                         const PassPlan& passes, const PictureSums& sums,
+Checkpoints::Checkpoints(FileSystem& fs, const CheckpointOptions& options, std::string identity,
+                         const SumsHeader& header, const PassPlan& passes, const PictureSums& sums,
                          const std::function<void(const std::string&)>& warning)
     : fs_(fs),
       options_(options),
@@ -87,8 +94,10 @@ void Checkpoints::write_when_due(RenderContext& context, bool stop) {
     if (context.ended || (!stop && now_seconds() < due_seconds_.load(std::memory_order_relaxed))) return;
     const Status written = write(context);
     if (stop && written.ok()) {
-      context.fail({ErrorCode::kStopped, fmt::format("the render was stopped before it was complete; --resume goes on from "
-                                                     "{}", options_.path)});
+      context.fail(
+          {ErrorCode::kStopped, fmt::format("the render was stopped before it was complete; --resume goes on from "
+                                            "{}",
+                                            options_.path)});
     } else if (stop) {
       context.fail({written.error().code,
                     "the render was stopped, and its checkpoint could not be written: " + written.error().message});
@@ -128,15 +137,16 @@ SumsHeader sums_header(const PictureOptions& picture, SumsKind kind) {
   return header;
 }
 
-Result<std::unique_ptr<SumsFile>> open_checkpoint(FileSystem& fs, const std::string& path, const std::string& identity,
-                                                  const PictureOptions& picture) {
+Result<std::unique_ptr<SumsFile>> open_checkpoint(FileSystem& fs, const std::string& path,
+                                                  const std::string& identity, const PictureOptions& picture) {
   SHOAL_ASSIGN_OR_RETURN(auto file, SumsFile::open(fs, path));
   if (file->header().kind != SumsKind::kCheckpoint) {
     return Error{ErrorCode::kInput, fmt::format("{} is a part of a picture, not a checkpoint", path)};
   }
   if (const std::string difference = identity_difference(identity, file->identity()); !difference.empty()) {
-    return Error{ErrorCode::kInput, fmt::format("{} is of another picture: {}. Ask for the same, or remove it to start afresh",
-                                                path, difference)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{} is of another picture: {}. Ask for the same, or remove it to start afresh", path,
+                             difference)};
   }
   SHOAL_RETURN_IF_ERROR(check_header(*file, picture));
   SHOAL_RETURN_IF_ERROR(check_samples(*file, picture));
@@ -146,8 +156,8 @@ Result<std::unique_ptr<SumsFile>> open_checkpoint(FileSystem& fs, const std::str
 Status resume_cursor(SumsFile& file, RenderContext& context) {
   const SumsHeader& header = file.header();
   if (header.next_sample > context.samples.count()) {
-    return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its pass has {} samples, found {} begun", file.path(),
-                                                  context.samples.count(), header.next_sample)};
+    return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its pass has {} samples, found {} begun",
+                                                  file.path(), context.samples.count(), header.next_sample)};
   }
   context.again.resize(header.unfinished_count);
   SHOAL_RETURN_IF_ERROR(file.read_unfinished(context.again));

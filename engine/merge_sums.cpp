@@ -22,8 +22,10 @@ Result<Parts> open_parts(FileSystem& fs, const std::vector<std::string>& paths) 
   for (const std::string& path : paths) {
     SHOAL_ASSIGN_OR_RETURN(auto part, SumsFile::open(fs, path));
     if (part->header().kind != SumsKind::kPart) {
-      return Error{ErrorCode::kInput, fmt::format("{} is the checkpoint of a render that is not complete: `shoal render "
-                                                  "--resume` goes on from it", path)};
+      return Error{ErrorCode::kInput,
+                   fmt::format("{} is the checkpoint of a render that is not complete: `shoal render "
+                               "--resume` goes on from it",
+                               path)};
     }
     parts.push_back(std::move(part));
   }
@@ -36,7 +38,9 @@ bool same_sums(const SumsHeader& a, const SumsHeader& b) {
   return a.width == b.width && a.height == b.height && a.halves == b.halves && a.aovs == b.aovs;
 }
 
-bool blue_noise(const std::string& identity) { return identity.find("\nsampler blue-noise\n") != std::string::npos; }
+bool blue_noise(const std::string& identity) {
+  return identity.find("\nsampler blue-noise\n") != std::string::npos;
+}
 
 /// Whether they are parts of one picture, which each of its samples is in once.
 Status check_parts(const Parts& parts) {
@@ -46,22 +50,28 @@ Status check_parts(const Parts& parts) {
   for (size_t i = 0; i < parts.size(); ++i) {
     const SumsFile& part = *parts[i];
     const SumsHeader& header = part.header();
-    if (const std::string difference = identity_difference(first.identity(), part.identity()); !difference.empty()) {
+    if (const std::string difference = identity_difference(first.identity(), part.identity());
+        !difference.empty()) {
       return Error{ErrorCode::kInput,
                    fmt::format("{} is not of the picture of {}: {}", part.path(), first.path(), difference)};
     }
     if (!same_sums(first.header(), header) || header.is_adaptive()) {
-      return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its header is not that of its picture", part.path())};
+      return Error{ErrorCode::kCorrupt,
+                   fmt::format("{} is damaged: its header is not that of its picture", part.path())};
     }
-    const bool same_numbers = !blue_noise(part.identity()) ||
-                              Sampler::same_numbers(SamplerKind::kBlueNoise, header.samples, samples, SampleSets::kOne);
+    const bool same_numbers =
+        !blue_noise(part.identity()) ||
+        Sampler::same_numbers(SamplerKind::kBlueNoise, header.samples, samples, SampleSets::kOne);
     if (!same_numbers) {
-      return Error{ErrorCode::kInput, fmt::format("{} is of {} samples a pixel, not of {}: with --sampler blue-noise they are "
-                                                  "others", part.path(), header.samples, samples)};
+      return Error{ErrorCode::kInput,
+                   fmt::format("{} is of {} samples a pixel, not of {}: with --sampler blue-noise they are "
+                               "others",
+                               part.path(), header.samples, samples)};
     }
     if (header.range.begin < done) {
-      return Error{ErrorCode::kInput, fmt::format("{} and {} both have samples {}:{}", parts[i - 1]->path(), part.path(),
-                                                  header.range.begin, std::min(done, header.range.end))};
+      return Error{ErrorCode::kInput,
+                   fmt::format("{} and {} both have samples {}:{}", parts[i - 1]->path(), part.path(),
+                               header.range.begin, std::min(done, header.range.end))};
     }
     if (header.range.begin > done) {
       return Error{ErrorCode::kInput, fmt::format("samples {}:{} are in no part", done, header.range.begin)};
@@ -90,7 +100,8 @@ Result<MergedPicture> merge_parts(FileSystem& fs, const std::vector<std::string>
     merged.samples = part->header().range.end;
     merged.seconds += part->header().seconds;
     if (!film.plausible(merged.samples) || (aovs != nullptr && !aovs->plausible())) {
-      return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its sums are not of so many samples", part->path())};
+      return Error{ErrorCode::kCorrupt,
+                   fmt::format("{} is damaged: its sums are not of so many samples", part->path())};
     }
   }
   add_channels(film.resolve(), aovs != nullptr ? aovs->resolve(film) : std::vector<ExrChannel>{}, merged.image);

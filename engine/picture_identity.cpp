@@ -50,7 +50,8 @@ void add_lens(const LensOptions& lens, Lines& lines) {
   lines.add("aperture", lens.aperture);
   lines.add("f-stop", lens.f_stop);
   lines.add("focus", lens.focus_distance);
-  lines.add("distortion", fmt::format("{}:{}", static_cast<int>(lens.distortion.model), fmt::join(lens.distortion.k, ",")));
+  lines.add("distortion",
+            fmt::format("{}:{}", static_cast<int>(lens.distortion.model), fmt::join(lens.distortion.k, ",")));
 }
 
 Status add_environment(FileSystem& fs, const ShadingOptions& shading, Lines& lines) {
@@ -86,7 +87,8 @@ std::map<std::string, std::string> values_by_name(const std::string& text) {
   for (size_t begin = 0; begin < text.size();) {
     const size_t end = std::min(text.find('\n', begin), text.size());
     const size_t space = std::min(text.find(' ', begin), end);
-    values[text.substr(begin, space - begin)] = text.substr(std::min(space + 1, end), end - std::min(space + 1, end));
+    values[text.substr(begin, space - begin)] =
+        text.substr(std::min(space + 1, end), end - std::min(space + 1, end));
     begin = end + 1;
   }
   return values;
@@ -97,7 +99,8 @@ std::map<std::string, std::string> values_by_name(const std::string& text) {
 Result<std::string> picture_identity(FileSystem& fs, const Scene& scene, const PictureOptions& picture) {
   ContentHash directory;
   directory.add(std::as_bytes(scene.file->records()));
-  // What may be added without a new file: a lamp at the camera of a scene without light (engine/light_unlit_scene.h).
+  // What may be added without a new file: a lamp at the camera of a scene without light
+  // (engine/light_unlit_scene.h).
   directory.add(std::as_bytes(std::span(scene.lights)));
   Lines lines;
   lines.add("program", SHOAL_VERSION);
@@ -122,7 +125,8 @@ std::string identity_difference(const std::string& expected, const std::string& 
     const auto at = there.find(name);
     const std::string other = at == there.end() ? "" : at->second;
     if (other == value) continue;
-    parts.push_back(fmt::format("{} is {}, not {}", name, other.empty() ? "nothing" : other, value.empty() ? "nothing" : value));
+    parts.push_back(fmt::format("{} is {}, not {}", name, other.empty() ? "nothing" : other,
+                                value.empty() ? "nothing" : value));
   }
   if (parts.empty() && expected != found) parts.push_back("it says more than is known here");
   return fmt::format("{}", fmt::join(parts, "; "));

@@ -12,8 +12,8 @@
 #include "engine/clock.h"
 #include "engine/merge_sums.h"
 #include "engine/order_runner.h"
-#include "engine/picture_identity.h"
 #include "engine/preview.h"
+#include "engine/render_beginning.h"
 #include "engine/render_record.h"
 #include "engine/render_report.h"
 #include "treelets/scene_traversal.h"
@@ -61,15 +61,6 @@ uint32_t coarse_levels(const MemoryPlan& plan) {
   return plan.cache_bytes >= plan.scene_page_bytes() ? SampleOrder::kAllLevels : kLevelsOutOfCore;
 }
 
-/// The samples of a pass, of what adaptive sampling draws of the picture.
-SampleOrder order_of(const PictureOptions& picture, SampleSpan span, const AdaptiveSampling* adaptive,
-                     uint32_t coarse_levels) {
-  if (adaptive != nullptr && !adaptive->whole_picture()) {
-    return SampleOrder(picture.width, picture.height, span, adaptive->blocks());
-  }
-  return SampleOrder(picture.width, picture.height, span, picture.tile_sample, coarse_levels);
-}
-
 /// Runs the orders over pass after pass. `samples`: of the first, is what context.samples names; of the last in the end.
 void render_passes(RenderContext& context, PassPlan& passes, SampleOrder& samples, OrderRunner& orders) {
   const PictureOptions& picture = context.picture;
@@ -89,42 +80,6 @@ void render_passes(RenderContext& context, PassPlan& passes, SampleOrder& sample
     samples = order_of(picture, span, adaptive, 0);
   }
 }
-
-/// What a render adds up.
-struct RenderSums {
-  Film film;
-  std::optional<AdaptiveSampling> adaptive;
-  std::unique_ptr<AovFilm> aovs;
-
-  static Result<RenderSums> create(const Scene& scene, const PictureOptions& picture, unsigned threads) {
-    const uint32_t width = picture.width, height = picture.height;
-    RenderSums sums{Film(width, height, picture.noise.asked() ? 2 : 1), {}, {}};
-    if (picture.noise.asked()) sums.adaptive.emplace(width, height, picture.noise, threads);
-    if (!picture.aovs.empty()) {
-      SHOAL_ASSIGN_OR_RETURN(sums.aovs, AovFilm::create(picture.aovs, width, height, *scene.file));
-    }
-    return sums;
-  }
-  PictureSums all() { return {film, aovs.get(), adaptive ? &*adaptive : nullptr}; }
-};
-
-/// Where the render begins: what is known of the picture for sums that are kept, and a checkpoint of it to go on from.
-struct Beginning {
-  std::string identity;
-  std::unique_ptr<SumsFile> earlier;  ///< or none
-
-  static Result<Beginning> find(FileSystem& fs, const Scene& scene, const PictureOptions& picture,
-                                ExecutionOptions& execution) {
-    Beginning beginning;
-    if (execution.checkpoint.path.empty() && execution.sums_path.empty()) return beginning;
-    SHOAL_ASSIGN_OR_RETURN(beginning.identity, picture_identity(fs, scene, picture));
-    if (!execution.checkpoint.resume) return beginning;
-    SHOAL_ASSIGN_OR_RETURN(beginning.earlier,
-                           open_checkpoint(fs, execution.checkpoint.path, beginning.identity, picture));
-    execution.checkpoint.unfinished_count = beginning.earlier->header().unfinished_count;
-    return beginning;
-  }
-};
 
 /// Of the pixels that are rendered.
 SampleReport report_samples(const RenderContext& context, uint64_t pixels, uint32_t passes_count) {
@@ -167,6 +122,23 @@ RenderResult finish_result(RenderContext& context, const MemoryPlan& plan, uint6
   result.peak_cache_bytes = context.cache.peak_resident_bytes();
   result.read_backend = context.cache.read_backend();
   return result;
+}
+
+/// Writes the sums of a complete render where they are asked for.
+Status write_part(FileSystem& fs, const std::string& path, const std::string& identity, const RenderContext& context,
+                  const PictureSums& sums) {
+  if (path.empty()) return {};
+  SumsHeader header = sums_header(context.picture, SumsKind::kPart);
+  header.seconds = context.seconds_before + now_seconds() - context.start_seconds;
+  const std::string attributes = attributes_text(described_image(context.scene, context.picture));
+  return write_sums(fs, path, header, identity, attributes, sums, nullptr);
+}
+
+/// A picture of so many samples, with those of a render that this one goes on from.
+void foretell(RenderContext& context, uint64_t samples, double limit_seconds) {
+  context.forecast = {samples, limit_seconds};
+  context.forecast.begins_with(context.samples_restored, context.seconds_before);
+  context.forecast.mark(context.samples_restored, now_seconds() - context.start_seconds);
 }
 
 /// Ends the clocks of a render that began at `start_ticks`: both clocks saw the same time.
@@ -235,8 +207,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   SHOAL_RETURN_IF_ERROR(check_options(scene, picture, asked));
   ExecutionOptions execution = asked;
   if (execution.threads == 0) execution.threads = std::max(1u, std::thread::hardware_concurrency());
-  SHOAL_ASSIGN_OR_RETURN(Beginning beginning, Beginning::find(fs, scene, picture, execution));
-  SumsFile* const earlier = beginning.earlier.get();
+  SHOAL_ASSIGN_OR_RETURN(RenderBeginning beginning, RenderBeginning::find(fs, scene, picture, execution));
   SHOAL_ASSIGN_OR_RETURN(std::unique_ptr<ShadingTables> tables, ShadingTables::create(fs, scene, picture.shading,
                                                                                         execution.threads));
   SHOAL_ASSIGN_OR_RETURN(MemoryPlan plan, plan_memory(scene, *tables, picture, execution));
@@ -251,22 +222,16 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   const SampleSpan range = asked_range(picture);
   SHOAL_ASSIGN_OR_RETURN(RenderSums sums, RenderSums::create(scene, picture, execution.threads));
   PassPlan passes(range.end, execution.time_limit_seconds, picture.noise.asked(), range.begin);
-  uint32_t levels = previewed ? coarse_levels(plan) : 0;
-  if (earlier != nullptr) {
-    SHOAL_RETURN_IF_ERROR(earlier->read_sums(sums.all()));
-    passes.resume(earlier->header().pass);
-    levels = earlier->header().coarse_levels;
-  } else {
-    passes.next(now_seconds() - start);
-  }
+  SHOAL_ASSIGN_OR_RETURN(const uint32_t levels,
+                         beginning.first_pass(sums.all(), passes, previewed ? coarse_levels(plan) : 0, now_seconds() - start));
   const uint64_t pixels = order_of(picture, passes.state().span, nullptr, 0).pixel_count();
-  if (earlier == nullptr && sums.adaptive) passes.begins_with(pixels);
+  if (!beginning.earlier && sums.adaptive) passes.begins_with(pixels);
   SampleOrder samples = order_of(picture, passes.state().span, sums.all().adaptive, levels);
   const Sampler sampler(picture.shading.sampler, picture.shading.seed, picture.width, picture.height, most_samples(picture),
                         sums.adaptive ? SampleSets::kHalves : SampleSets::kOne);
   std::optional<Preview> preview;
   if (previewed) preview.emplace(fs, execution.preview, sums.film, samples, execution.threads, start, hooks.warning);
-  OrderRunner orders(scene, execution, plan, samples.count() - (earlier != nullptr ? earlier->done_in_pass() : 0));
+  OrderRunner orders(scene, execution, plan, samples.count() - beginning.done_in_pass());
   PageCache cache(*scene.file, plan.cache_bytes,
                   [&scene](const PageRecord& record, std::span<const std::byte> bytes) {
                     return check_page(scene, record, bytes);
@@ -280,8 +245,7 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
   context.aovs = sums.aovs.get();
   context.adaptive = sums.all().adaptive;
   context.touches = execution.touches;
-  if (earlier != nullptr) SHOAL_RETURN_IF_ERROR(resume_cursor(*earlier, context));
-  beginning.earlier.reset();
+  SHOAL_RETURN_IF_ERROR(beginning.begin(context));
   SumsHeader header = sums_header(picture, SumsKind::kCheckpoint);
   header.coarse_levels = levels;
   std::optional<Checkpoints> checkpoints;
@@ -295,21 +259,14 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
                                                 plan.read_depth, start_ticks, start));
   }
   const RecordedScope recorded(context.record, context.phases);
-  context.forecast = {sums.adaptive ? 0 : pixels * range.count(), execution.time_limit_seconds};
-  context.forecast.begins_with(context.samples_restored, context.seconds_before);
-  context.forecast.mark(context.samples_restored, now_seconds() - start);
+  foretell(context, sums.adaptive ? 0 : pixels * range.count(), execution.time_limit_seconds);
   render_passes(context, passes, samples, orders);
   orders.release();
   cache.finish_loads();
   SHOAL_RETURN_IF_ERROR(context.error);
   add_cache_counters(cache.background_counters(), context.counters);
   SHOAL_RETURN_IF_ERROR(check_identities(context.counters, context.samples_before - context.samples_restored));
-  if (!execution.sums_path.empty()) {
-    const std::string attributes = attributes_text(described_image(scene, picture));
-    SumsHeader part = sums_header(picture, SumsKind::kPart);
-    part.seconds = context.seconds_before + now_seconds() - start;
-    SHOAL_RETURN_IF_ERROR(write_sums(fs, execution.sums_path, part, beginning.identity, attributes, sums.all(), nullptr));
-  }
+  SHOAL_RETURN_IF_ERROR(write_part(fs, execution.sums_path, beginning.identity, context, sums.all()));
   RenderResult result = finish_result(context, plan, pixels, preview, execution.sums_path.empty());
   result.order = orders.chosen();
   result.samples = report_samples(context, pixels, passes.passes_count());

@@ -87,8 +87,7 @@ Status write_unfinished(SumsWriter& writer, const UnfinishedPaths& unfinished) {
 }  // namespace
 
 Status write_sums(FileSystem& fs, const std::string& path, SumsHeader header, const std::string& identity,
-                  const std::string& attributes, const PictureSums& sums,
-                  const UnfinishedPaths* unfinished) {
+                  const std::string& attributes, const PictureSums& sums, const UnfinishedPaths* unfinished) {
   header.width = sums.film.width(), header.height = sums.film.height();
   header.halves = sums.adaptive != nullptr ? 2 : 1;
   header.aovs = sums.aovs != nullptr ? sums.aovs->set().bits : 0;
@@ -97,7 +96,8 @@ Status write_sums(FileSystem& fs, const std::string& path, SumsHeader header, co
   header.identity_hash = hash_of(identity);
   if (sums.adaptive != nullptr) header.adaptive = sums.adaptive->numbers();
   header.unfinished_count = 0;
-  if (unfinished != nullptr) unfinished->each_unfinished([&](const UnfinishedSample&) { ++header.unfinished_count; });
+  if (unfinished != nullptr)
+    unfinished->each_unfinished([&](const UnfinishedSample&) { ++header.unfinished_count; });
   header.checksum = header_checksum(header);
   SHOAL_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(fs, path));
   SumsWriter writer(std::move(file));
@@ -127,15 +127,17 @@ Status SumsFile::check_header() const {
   if (h.kind != SumsKind::kCheckpoint && h.kind != SumsKind::kPart) return damaged("it is of no known kind");
   const bool size = h.width > 0 && h.height > 0 && h.width <= 65536 && h.height <= 65536 &&
                     uint64_t{h.width} * h.height < (1ull << 31);
-  const bool samples = h.samples > 0 && h.samples <= kMostSamples && h.range.begin < h.range.end && h.range.end <= h.samples;
-  const bool pass = h.kind == SumsKind::kPart ||
-                    (h.range.begin <= h.pass.span.begin && h.pass.span.begin < h.pass.span.end &&
-                     h.pass.span.end <= h.range.end && h.pass.pixels > 0 && h.pass.began >= 0);
+  const bool samples =
+      h.samples > 0 && h.samples <= kMostSamples && h.range.begin < h.range.end && h.range.end <= h.samples;
+  const bool pass =
+      h.kind == SumsKind::kPart || (h.range.begin <= h.pass.span.begin && h.pass.span.begin < h.pass.span.end &&
+                                    h.pass.span.end <= h.range.end && h.pass.pixels > 0 && h.pass.began >= 0);
   // Samples in hand belong to paths in flight; a thread has a few more.
   const bool unfinished = h.unfinished_count <= h.next_sample && h.unfinished_count <= 2ull * kMaxPathsInFlight &&
                           (h.kind == SumsKind::kCheckpoint || h.unfinished_count == 0);
-  const bool rest = (h.halves == 1 || h.halves == 2) && h.aovs < 1u << kAovCount && h.identity_bytes <= kMostTextBytes &&
-                    h.attributes_bytes <= kMostTextBytes && h.seconds >= 0 && h.coarse_levels <= SampleOrder::kAllLevels;
+  const bool rest = (h.halves == 1 || h.halves == 2) && h.aovs < 1u << kAovCount &&
+                    h.identity_bytes <= kMostTextBytes && h.attributes_bytes <= kMostTextBytes && h.seconds >= 0 &&
+                    h.coarse_levels <= SampleOrder::kAllLevels;
   if (!size || !samples || !pass || !unfinished || !rest) return damaged("its header makes no sense");
   if (file_->size_bytes() == file_bytes(h)) return {};
   return damaged(fmt::format("expected {} bytes, found {}", file_bytes(h), file_->size_bytes()));
@@ -147,15 +149,18 @@ Result<std::unique_ptr<SumsFile>> SumsFile::open(FileSystem& fs, const std::stri
   std::unique_ptr<SumsFile> sums(new SumsFile(std::move(file), path));
   SumsHeader& header = sums->header_;
   if (bytes < sizeof(SumsHeader)) {
-    return Error{ErrorCode::kInput, fmt::format("{} is no checkpoint and no part of a picture: expected {} bytes at least, "
-                                                "found {}", path, sizeof(SumsHeader), bytes)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{} is no checkpoint and no part of a picture: expected {} bytes at least, "
+                             "found {}",
+                             path, sizeof(SumsHeader), bytes)};
   }
   SHOAL_RETURN_IF_ERROR(sums->read(std::as_writable_bytes(std::span(&header, 1))));
   if (header.magic != kSumsMagic) {
     return Error{ErrorCode::kInput, fmt::format("{} is no checkpoint and no part of a picture", path)};
   }
   if (header.version != kSumsVersion || header.endian_mark != SumsHeader{}.endian_mark) {
-    return Error{ErrorCode::kInput, fmt::format("{}: expected version {}, found {}", path, kSumsVersion, header.version)};
+    return Error{ErrorCode::kInput,
+                 fmt::format("{}: expected version {}, found {}", path, kSumsVersion, header.version)};
   }
   if (header.checksum != header_checksum(header)) return sums->damaged("the checksum of its header is wrong");
   SHOAL_RETURN_IF_ERROR(sums->check_header());
@@ -163,7 +168,8 @@ Result<std::unique_ptr<SumsFile>> SumsFile::open(FileSystem& fs, const std::stri
   sums->attributes_.resize(header.attributes_bytes);
   SHOAL_RETURN_IF_ERROR(sums->read(std::as_writable_bytes(std::span(sums->identity_))));
   SHOAL_RETURN_IF_ERROR(sums->read(std::as_writable_bytes(std::span(sums->attributes_))));
-  if (hash_of(sums->identity_) != header.identity_hash) return sums->damaged("what it says of its picture is not what was written");
+  if (hash_of(sums->identity_) != header.identity_hash)
+    return sums->damaged("what it says of its picture is not what was written");
   return sums;
 }
 
@@ -206,9 +212,8 @@ Status SumsFile::read_sums(const PictureSums& sums) {
 }
 
 Status SumsFile::add_sums(const PictureSums& sums) {
-  SHOAL_RETURN_IF_ERROR(read_in_blocks(sums.film.raw().size(), Film::kPixelBytes, [&](uint64_t at, auto bytes) {
-    sums.film.add_raw(at, bytes);
-  }));
+  SHOAL_RETURN_IF_ERROR(read_in_blocks(sums.film.raw().size(), Film::kPixelBytes,
+                                       [&](uint64_t at, auto bytes) { sums.film.add_raw(at, bytes); }));
   if (sums.aovs == nullptr) return {};
   constexpr uint64_t kEverySum = 48;  // 4, 8, 16 and 24 bytes
   for (const AovFilm::Plane& plane : sums.aovs->planes()) {

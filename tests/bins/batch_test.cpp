@@ -310,10 +310,11 @@ TEST(Batch, OnlyOneIsAtWorkAndItStopsWithItsRenders) {
   EXPECT_THAT(stopped.err, HasSubstr("stopped"));
   EXPECT_EQ(batch.summary()["state"], "stopped");
   EXPECT_EQ(batch.summary()["left_count"], 3);
-  EXPECT_TRUE(batch.outputs().empty());
+  EXPECT_THAT(batch.outputs(), ::testing::Each(::testing::EndsWith(".exr.checkpoint")));
   expect_no_temporaries(batch.out());
   expect_exit(batch.run(), 0);
   EXPECT_EQ(batch.summary()["done_count"], 3);
+  EXPECT_THAT(batch.outputs(), ::testing::Not(::testing::Contains(::testing::EndsWith(".checkpoint"))));
 }
 
 }  // namespace

@@ -110,12 +110,13 @@ TEST(Output, APreviewStaysWhenARenderIsStopped) {
     const auto preview = decode_image(std::as_bytes(std::span(png)), "preview.png", 1 << 20);
     ASSERT_TRUE(preview.ok()) << preview.error().message;
     EXPECT_EQ(preview.value().width, 512u);
-    EXPECT_THAT(folder.names(), ::testing::ElementsAre("preview.png", "terrain", "terrain.shoal"));
+    EXPECT_THAT(folder.names(),
+                ::testing::ElementsAre("out.exr.checkpoint", "preview.png", "terrain", "terrain.shoal"));
     std::filesystem::remove(folder / "preview.png");
   }
 }
 
-TEST(Output, SignalsStopARenderWithCodeNineAndNoFile) {
+TEST(Output, SignalsStopARenderWithCodeNineAndNoFileButItsCheckpoint) {
   const TemporaryFolder folder;
   make_terrain(folder, "1K");
   for (const char* order : {"queued", "depth-first", "sorted", "hybrid", "auto"}) {
@@ -132,7 +133,7 @@ TEST(Output, SignalsStopARenderWithCodeNineAndNoFile) {
       EXPECT_THAT(run.err, ::testing::HasSubstr("the render was stopped"));
     }
   }
-  EXPECT_THAT(folder.names(), ::testing::ElementsAre("terrain", "terrain.shoal"));
+  EXPECT_THAT(folder.names(), ::testing::ElementsAre("out.exr.checkpoint", "terrain", "terrain.shoal"));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Whatever write of a checkpoint fails: the one before stays, whole, or the new one is, and a render that is not to stop
-// goes on.
+// Whatever write of a checkpoint fails: the one before stays, whole, or the new one is, and a render that is not to
+// stop goes on.
 #include "tests/engine/stopped_render.h"
 #include "tests/support/faulty_file_system.h"
 

@@ -1,4 +1,5 @@
-// A small scene, ways to render it, and renders that are stopped at random. Used by tests of checkpoints and of parts.
+// A small scene, ways to render it, and renders that are stopped at random. Used by tests of checkpoints and of
+// parts.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -35,9 +36,15 @@ inline const RenderWay kRenderWays[] = {
     {.name = "auto", .order = Order::kAuto, .threads = 3},
     {.name = "queued, smallest cache", .rays_in_flight = 2000, .smallest_cache = true},
     {.name = "queued, one block of rays, with a preview", .threads = 1, .rays_in_flight = 64, .preview = true},
-    {.name = "sorted, small waves, smallest cache", .order = Order::kSorted, .rays_in_flight = 1000, .smallest_cache = true},
-    {.name = "depth-first, smallest cache, with a preview", .order = Order::kDepthFirst, .threads = 3,
-     .smallest_cache = true, .preview = true},
+    {.name = "sorted, small waves, smallest cache",
+     .order = Order::kSorted,
+     .rays_in_flight = 1000,
+     .smallest_cache = true},
+    {.name = "depth-first, smallest cache, with a preview",
+     .order = Order::kDepthFirst,
+     .threads = 3,
+     .smallest_cache = true,
+     .preview = true},
 };
 
 class StoppedRender : public ::testing::Test {
@@ -47,12 +54,12 @@ class StoppedRender : public ::testing::Test {
   void SetUp() override {
     GenerateOptions options;
     options.kind = "demo";
-    options.triangles = 20000;
+    options.triangles = 3000;
     options.out_dir = folder_ / "demo";
     const auto report = generate_scene(posix_file_system(), options);
     ASSERT_TRUE(report.ok());
     SceneBuildOptions build;
-    build.treelet_bytes = 16u << 10;
+    build.treelet_bytes = 4u << 10;
     ASSERT_TRUE(build_scene(posix_file_system(), report.value().gltf_path, folder_ / "scene.shoal", build).ok());
     picture_.width = 40, picture_.height = 32, picture_.samples = 4;
     picture_.shading.bounces = 4;
@@ -121,11 +128,13 @@ class StoppedRender : public ::testing::Test {
       const ExrChannel &a = actual.layers[i], &b = expected.layers[i];
       EXPECT_EQ(a.integers, b.integers) << what << ", " << b.name;
       ASSERT_EQ(a.values.size(), b.values.size());
-      EXPECT_EQ(std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)), 0) << what << ", " << b.name;
+      EXPECT_EQ(std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)), 0)
+          << what << ", " << b.name;
     }
   }
 
-  /// Stops the render again and again, each time in another way, until it is complete: then its bits are those of `expected`.
+  /// Stops the render again and again, each time in another way, until it is complete: then its bits are those of
+  /// `expected`.
   void expect_same_however_stopped(const RenderResult& expected, uint32_t renders) {
     std::mt19937 random(7);
     uint32_t stops = 0;
