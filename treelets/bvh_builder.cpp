@@ -19,9 +19,9 @@ std::vector<BinaryNode> build_tree(BvhBuilder builder, std::span<BuildRef> refs,
 }
 
 uint64_t builder_scratch_bytes(BvhBuilder builder) {
-  // The full tree, the codes along the curve or the order of the leaves beside it. Keys and the copies that
-  // references are reordered through (treelets/morton_order, treelets/full_tree) come before it and after it, and
-  // are smaller.
+  // The full tree (of lbvh: the subtrees that are copied into one array, at most as large), the codes along the curve
+  // or the order of the leaves beside it. Keys and the copies that references are reordered through
+  // (treelets/morton_order, treelets/full_tree) come before it and after it, and are smaller.
   return builder == BvhBuilder::kSah ? 0 : FullTree::kBytesPerRef + sizeof(uint64_t);
 }
 

@@ -256,6 +256,25 @@ double least_cost(const std::vector<BuildRef>& refs, const RestructureModel& mod
   return std::min(closed, model.node_cost * area + least);
 }
 
+TEST(LinearBvh, ClosesLeavesAsIfTheTreeHadBeenStored) {
+  for (const auto& soup : {random_soup(50000, 0.01f), grid_soup(30)}) {
+    std::vector<BuildRef> refs[2] = {refs_of(soup), refs_of(soup)};
+    const std::vector<BinaryNode> trees[2] = {build_linear_bvh(refs[0], {16}),
+                                              close_leaves(build_radix_tree(refs[1]), refs[1], {16})};
+    const auto leaves = [](const std::vector<BinaryNode>& tree) {
+      std::vector<std::pair<uint32_t, uint32_t>> all;
+      for (const BinaryNode& node : tree) {
+        if (node.leaf()) all.emplace_back(node.first, node.count);
+      }
+      std::sort(all.begin(), all.end());
+      return all;
+    };
+    EXPECT_EQ(leaves(trees[0]), leaves(trees[1]));
+    EXPECT_EQ(trees[0].size(), trees[1].size());
+    EXPECT_EQ(std::memcmp(refs[0].data(), refs[1].data(), refs[0].size() * sizeof(BuildRef)), 0);
+  }
+}
+
 TEST(RestructuredBvh, FindsTheBestTreeOfSevenTriangles) {
   int improved = 0;
   for (uint64_t seed = 1; seed <= 20; ++seed) {
