@@ -98,6 +98,16 @@ bool KindTable::identical() const {
   return std::all_of(rows.begin(), rows.end(), [](const KindRow& row) { return row.identical; });
 }
 
+void KindTable::append(KindTable other) {
+  SHOAL_CHECK(rows.size() == other.rows.size());
+  for (size_t i = 0; i < rows.size(); ++i) {
+    SHOAL_CHECK(rows[i].birth == other.rows[i].birth && rows[i].bounce == other.rows[i].bounce);
+    rows[i].identical = rows[i].identical && other.rows[i].identical;
+    for (KindInOrder& order : other.rows[i].orders) rows[i].orders.push_back(std::move(order));
+  }
+  for (std::string& label : other.labels) labels.push_back(std::move(label));
+}
+
 Status check_kinds(const PreparedRender& prepared, const std::vector<OrderChoice>& orders, const KindOptions& options) {
   return check_kinds_fit(posix_file_system(), prepared.scene, prepared.picture, executions_of(prepared, orders), options);
 }

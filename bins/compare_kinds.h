@@ -31,6 +31,8 @@ struct KindTable {
   std::vector<std::string> labels;  ///< of the orders of each row
 
   bool identical() const;
+  /// The orders of the same rays over another tree. Requires: the same kinds.
+  void append(KindTable other);
 };
 
 /// Whether the cap has room for that, before anything is rendered. Fails with: kMemoryCap.

@@ -60,6 +60,35 @@ TEST(Builder, IsRefusedByNameWhereItIsUnknown) {
   }
 }
 
+TEST(Builder, IsComparedByOrders) {
+  const TemporaryFolder folder;
+  expect_exit(run_shoal(folder, {"generate", "terrain", "--triangles", "3K", "--out", folder / "terrain"}), 0);
+  const std::string gltf = folder / "terrain/terrain.gltf";
+  const auto compare = [&](const std::string& scene, const std::vector<std::string>& options) {
+    return run_shoal(folder, join(join({"compare", scene, "--orders", "queued,depth-first", "--out", folder / "out",
+                                        "--cache-dir", folder / "cache"},
+                                       tiny_picture()),
+                                  options));
+  };
+  const ProgramRun run = compare(gltf, {"--builders", "sah,karras", "--runs", "2"});
+  expect_exit(run, 0);
+  EXPECT_THAT(run.out, HasSubstr("karras/queued"));
+  const json report = json::parse(file_text(folder / "out/compare.json"));
+  EXPECT_EQ(report["pictures_identical"], true);
+  ASSERT_EQ(report["orders"].size(), 4u);
+  for (const std::string builder : {"sah", "karras"}) {
+    for (const std::string order : {"queued", "depth-first"}) {
+      const json& stats = report["orders"][builder + "/" + order];
+      EXPECT_EQ(stats["scene"]["builder"], builder);
+      EXPECT_EQ(stats["run_seconds"].size(), 2u);
+    }
+  }
+  EXPECT_EQ(folder.names("cache").size(), 2u);
+  expect_error(compare(gltf, {"--builders", "sah,morton"}), 2, {"expected sah, lbvh or karras"});
+  expect_error(compare(gltf, {"--builders", "lbvh", "--builder", "sah"}), 2, {"--builder and --builders"});
+  expect_error(compare(folder / "x.shoal", {"--builders", "lbvh"}), 2, {"--builders is of a .gltf"});
+}
+
 TEST(Builder, StaysUnderTheCap) {
   const TemporaryFolder folder;
   expect_exit(run_shoal(folder, {"generate", "terrain", "--triangles", "400K", "--out", folder / "terrain"}), 0);
