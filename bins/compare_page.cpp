@@ -116,60 +116,67 @@ ReportSection summary_section(const Json& json) {
   return section;
 }
 
-/// What a model of the processor's caches says, where there is one.
-ReportSection caches_section(const Json& json) {
-  ReportSection section{"The processor's caches, modelled", {}};
-  ReportTable table{{"order", "level"}, {}, "Lines of 64 bytes, of one core, by a model that is told every access."};
-  std::vector<std::string> columns;
-  for (const auto& [label, order] : json["orders"].items()) {
-    if (!order.contains("cache_model") || !order["cache_model"].contains("levels")) continue;
-    const Json& levels = order["cache_model"]["levels"];
-    for (size_t i = 0; i < levels.size(); ++i) {
-      if (columns.empty()) {
-        for (const auto& [key, value] : levels[i].items()) {
-          if (key != "name") columns.push_back(key);
-        }
-        table.head.insert(table.head.end(), columns.begin(), columns.end());
-      }
-      ReportTable::Row row{{{label}, {levels[i].value("name", "")}}};
-      for (const std::string& column : columns) {
-        row.cells.push_back(cell_at(json, fmt::format("{}/cache_model/levels/{}/{}", order_place(label), i, escaped(column)),
-                                    shown_for(column)));
-      }
-      table.rows.push_back(std::move(row));
+/// Columns for all keys of plain values in the objects at `places`, a row each, behind the cells that it has.
+struct PlainTable {
+  const Json& json;
+  ReportTable table;
+  size_t cells_before = table.head.size();
+  std::vector<std::string> columns = {};
+
+  void add(ReportTable::Row row, const std::string& place, const std::vector<std::string>& without) {
+    for (const auto& [key, value] : json.at(Json::json_pointer(place)).items()) {
+      const bool shown = !value.is_structured() && std::find(without.begin(), without.end(), key) == without.end();
+      if (!shown || std::find(columns.begin(), columns.end(), key) != columns.end()) continue;
+      columns.push_back(key);
+      table.head.push_back(key);
     }
+    for (const std::string& column : columns) {
+      row.cells.push_back(cell_at(json, fmt::format("{}/{}", place, escaped(column)), shown_for(column)));
+    }
+    table.rows.push_back(std::move(row));
   }
-  if (!table.rows.empty()) section.blocks.emplace_back(std::move(table));
+  /// Rows that came before a column have nothing there.
+  ReportTable finished() {
+    for (ReportTable::Row& row : table.rows) row.cells.resize(cells_before + columns.size(), {"-"});
+    return std::move(table);
+  }
+};
+
+/// What a model of the processor's caches says, and its own counters, where there are any.
+ReportSection caches_section(const Json& json) {
+  ReportSection section{"The processor's caches", {}};
+  PlainTable model{json, {{"order", "level"}, {}, "By a model that is told every access; docs/measuring.md."}};
+  PlainTable hardware{json, {{"order"}, {}, "The processor's own counters, of the whole run."}};
+  for (const auto& [label, order] : json["orders"].items()) {
+    const Json levels = order.value(Json::json_pointer("/cache_model/levels"), Json::array());
+    for (size_t i = 0; i < levels.size(); ++i) {
+      model.add({{{label}, {levels[i].value("name", "")}}}, fmt::format("{}/cache_model/levels/{}", order_place(label), i),
+                {"name"});
+    }
+    if (!order.value(Json::json_pointer("/hardware_counters/available"), false)) continue;
+    hardware.add({{{label}}}, fmt::format("{}/hardware_counters", order_place(label)), {"available", "reason"});
+  }
+  for (PlainTable* table : {&model, &hardware}) {
+    if (!table->table.rows.empty()) section.blocks.emplace_back(table->finished());
+  }
   return section;
 }
 
 /// How fast each order traces rays of each kind, where that was measured.
 ReportSection kinds_section(const Json& json) {
   ReportSection section{"Kinds of rays", {}};
-  if (!json.contains("ray_kinds") || json["ray_kinds"].empty()) return section;
-  ReportTable table{{"kind", "bounce", "rays"}, {}, ""};
-  std::vector<std::pair<std::string, std::string>> columns;  // order, figure
-  const Json& kinds = json["ray_kinds"];
-  for (const Json& kind : kinds) {
-    const Json orders = kind.value("orders", Json::object());
-    for (const auto& [label, figures] : orders.items()) {
-      for (const auto& [name, value] : figures.items()) {
-        const std::pair<std::string, std::string> column(label, name);
-        if (std::find(columns.begin(), columns.end(), column) == columns.end()) columns.push_back(column);
-      }
-    }
-  }
-  for (const auto& [label, name] : columns) table.head.push_back(label + ": " + name);
+  PlainTable table{json, {{"kind", "bounce", "rays", "order"}, {}, "The same rays of each kind, in each order."}};
+  const Json kinds = json.value("ray_kinds", Json::array());
   for (size_t i = 0; i < kinds.size(); ++i) {
     const std::string place = fmt::format("/ray_kinds/{}", i);
-    ReportTable::Row row{{cell_at(json, place + "/kind", Shown::kCount), cell_at(json, place + "/bounce", Shown::kCount),
-                          cell_at(json, place + "/rays_count", Shown::kCount)}};
-    for (const auto& [label, name] : columns) {
-      row.cells.push_back(cell_at(json, fmt::format("{}/orders/{}/{}", place, escaped(label), escaped(name)), shown_for(name)));
+    const Json orders = kinds[i].value("orders", Json::object());
+    for (const auto& [label, figures] : orders.items()) {
+      table.add({{cell_at(json, place + "/kind", Shown::kCount), cell_at(json, place + "/bounce", Shown::kCount),
+                  cell_at(json, place + "/rays_count", Shown::kCount), {label}}},
+                fmt::format("{}/orders/{}", place, escaped(label)), {});
     }
-    table.rows.push_back(std::move(row));
   }
-  section.blocks.emplace_back(std::move(table));
+  if (!table.table.rows.empty()) section.blocks.emplace_back(table.finished());
   return section;
 }
 

@@ -47,11 +47,12 @@ Json traffic_of(const Json& order) {
   }
   if (!order.contains("cache_model")) return traffic;
   const Json& model = order["cache_model"];
+  const double line_bytes = model.value("line_bytes", kLineBytes);
   for (const Json& level : model.value("levels", Json::array())) {
     if (!level.contains("name") || !level.contains("misses_count")) continue;
-    const double bytes = kLineBytes * level["misses_count"].get<double>();
+    const double bytes = line_bytes * level["misses_count"].get<double>();
     traffic[fmt::format("lines into {}", level["name"].get<std::string>())] = {
-        {"bytes", bytes}, {"bytes_per_ray", ratio(bytes, rays)}, {"meaning", "64-byte lines, by the model of the caches"}};
+        {"bytes", bytes}, {"bytes_per_ray", ratio(bytes, rays)}, {"meaning", "cache lines, by the model of the caches"}};
   }
   if (model.contains("memory_bytes_per_ray")) {
     traffic["memory"] = {{"bytes_per_ray", model["memory_bytes_per_ray"]},
