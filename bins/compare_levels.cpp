@@ -13,6 +13,11 @@ constexpr const char* kModelHelp =
     "and "
     "memory bytes a ray (default; timed runs are not touched by it)";
 
+/// So many rays take half a minute of processor time by the model of all sets (docs/measuring.md); more are modelled by
+/// one in kSetsOfManyRays.
+constexpr uint64_t kRaysForAllSets = 4'000'000;
+constexpr uint32_t kSetsOfManyRays = 16;
+
 /// Orders whose kernels can tell what they touch; auto chooses among them.
 bool tells_touches(Order order) {
   return order == Order::kAuto || order == Order::kQueued || order == Order::kDepthFirst ||
@@ -51,16 +56,18 @@ void LevelArguments::declare(CLI::App& app) {
       "caches to model, the innermost first, as SIZE:WAYS,..., such as 48K:12,2M:16,105M:15; the last of two "
       "or more is shared by all threads (default: those of this machine)");
   app.add_option("--cache-sets", cache_sets,
-                 "model one in so many sets of every cache, a power of two: faster, less sure")
-      ->capture_default_str();
+                 "model one in so many sets of every cache, a power of two: faster, less sure of L1 (default: all of "
+                 "up to 4 million rays, else one in 16)");
 }
 
-Result<CacheModel::Options> LevelArguments::options() const {
-  CacheModel::Options options{.levels = machine_cache_levels().shapes, .one_in = cache_sets};
+Result<CacheModel::Options> LevelArguments::options(uint64_t rays) const {
+  CacheModel::Options options{.levels = machine_cache_levels().shapes, .one_in = std::max(cache_sets, 1u)};
   if (!cache_levels.empty()) {
     SHOAL_ASSIGN_OR_RETURN(options.levels, parse_cache_levels(cache_levels));
   }
   SHOAL_RETURN_IF_ERROR(options.check());
+  if (cache_sets > 0 || rays <= kRaysForAllSets) return options;
+  for (options.one_in = kSetsOfManyRays; !options.check().ok();) options.one_in /= 2;  // of small caches fewer
   return options;
 }
 
@@ -68,7 +75,7 @@ Result<std::vector<float>> model_order(const LevelArguments& arguments, const Pr
                                        const ExecutionOptions& execution, Console& console, LevelFigures& figures) {
   figures.no_touches = why_not(arguments, prepared, execution);
   if (!figures.no_touches.empty()) return std::vector<float>();
-  SHOAL_ASSIGN_OR_RETURN(const CacheModel::Options options, arguments.options());
+  SHOAL_ASSIGN_OR_RETURN(const CacheModel::Options options, arguments.options(figures.rays));
   figures.cache_source = arguments.cache_levels.empty() ? machine_cache_levels().source : "given";
   TouchRecorder recorder(options);
   ExecutionOptions modelled = execution;

@@ -13,11 +13,11 @@ namespace shoal {
 struct LevelArguments {
   bool model = true;
   std::string cache_levels;  ///< empty: the machine's
-  uint32_t cache_sets = 1;   ///< one in so many is modelled
+  uint32_t cache_sets = 0;   ///< one in so many is modelled; 0: by the number of rays
 
   void declare(CLI::App& app);
-  /// What to model. Fails with: kUsage.
-  Result<CacheModel::Options> options() const;
+  /// What to model of so many rays. Fails with: kUsage.
+  Result<CacheModel::Options> options(uint64_t rays) const;
 };
 
 /// Renders once more in the order of `execution`, every touch told to a model of the caches, into `figures`: what

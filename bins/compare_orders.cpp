@@ -192,7 +192,7 @@ Status check_compare_arguments(const CompareArguments& arguments) {
     return Error{ErrorCode::kUsage, "--builder and --builders: expected one of them"};
   }
   if (auto kinds = parse_kinds(arguments.kinds, arguments.runs); !kinds.ok()) return std::move(kinds).error();
-  SHOAL_RETURN_IF_ERROR(arguments.levels.options());
+  SHOAL_RETURN_IF_ERROR(arguments.levels.options(0));
   return {};
 }
 

@@ -43,7 +43,7 @@ class TouchRecorderTest : public ::testing::Test {
 
   static RenderResult render_with(const Scene& scene, Order order, unsigned threads, TouchRecorder* recorder) {
     PictureOptions picture;
-    picture.width = 40, picture.height = 40, picture.samples = 2;
+    picture.width = 24, picture.height = 24, picture.samples = 2;
     picture.shading.bounces = 3;
     picture.shading.environment = {EnvironmentOptions::Kind::kConstant, Vec3(0.5f), {}};
     ExecutionOptions execution;
