@@ -109,11 +109,16 @@ HWY_INLINE void touch_pop(const Meter& meter, const Lane& lane) {
   }
 }
 
+/// Lanes that so many triangles take: whole vectors.
+HWY_INLINE uint32_t lanes_of(uint32_t triangles) {
+  return static_cast<uint32_t>((triangles + kLeafLanes - 1) / kLeafLanes * kLeafLanes);
+}
+
 /// What a test of a leaf reads: header, positions and corners, to the end of the last vector.
 template <class Meter>
 HWY_INLINE void touch_leaf(const Meter& meter, const LeafView& leaf) {
   if constexpr (Meter::kMeters) {
-    const auto* end = reinterpret_cast<const std::byte*>(leaf.corner(2) + kLeafLanes);
+    const auto* end = reinterpret_cast<const std::byte*>(leaf.corner(2) + lanes_of(leaf.triangle_count));
     meter.log->read(leaf.leaf, static_cast<size_t>(end - leaf.leaf), TouchKind::kLeaves);
   }
 }
@@ -123,8 +128,7 @@ template <class Meter>
 HWY_INLINE void touch_candidates(const Meter& meter, const LeafView& leaf) {
   if constexpr (Meter::kMeters) {
     touch_leaf(meter, leaf);
-    const auto lanes = static_cast<uint32_t>((leaf.triangle_count + kLeafLanes - 1) / kLeafLanes * kLeafLanes);
-    meter.log->lanes.leaves.add(leaf.triangle_count, lanes);
+    meter.log->lanes.leaves.add(leaf.triangle_count, lanes_of(leaf.triangle_count));
   }
 }
 
