@@ -34,7 +34,9 @@ void RenderWorker::record_pin(TreeletId treelet, bool geometry, uint64_t decoded
   const uint64_t decoded = cache_counters_.decoded_bytes - decoded_before, now = now_ticks();
   if (decoded > 0) record_->note_load(treelet, geometry, decoded);
   if (record_->traces()) record_->note_wait(treelet, now - waited, now, decoded);
-  record_progress(true);
+  // Attributes are waited for while shading, which gives that time to paging when it is through: phases are not told of
+  // before.
+  if (geometry) record_progress(true);
 }
 
 }  // namespace shoal
