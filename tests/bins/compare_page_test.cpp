@@ -42,7 +42,8 @@ class ComparePage : public ::testing::Test {
   std::vector<json> specs(const std::string& kind) const {
     std::vector<json> found;
     const std::string mark = "<script type=\"application/json\">", begin = "<figure class=\"" + kind;
-    for (size_t at = html_.find(begin); at != std::string::npos; at = html_.find(begin, at + 1)) {
+    const size_t end = html_.find("id=\"data\"");  // scripts behind it name such figures
+    for (size_t at = html_.find(begin); at < end; at = html_.find(begin, at + 1)) {
       const size_t start = html_.find(mark, at) + mark.size();
       found.push_back(json::parse(html_.substr(start, html_.find("</script>", start) - start), nullptr, false));
     }
