@@ -11,7 +11,7 @@ namespace {
 /// Chosen by the batch, or of no use in one.
 const std::set<std::string>& kept_back() {
   static const std::set<std::string> kNames{"help",       "output",  "png",           "preview", "stats",       "cache-dir",
-                                            "max-memory", "threads", "discard-built", "resume",  "sample-range"};
+                                            "max-memory", "threads", "discard-built", "resume",  "sample-range", "trace"};
   return kNames;
 }
 

@@ -12,6 +12,7 @@
 #include "bins/render_options.h"
 #include "engine/accuracy_names.h"
 #include "engine/accuracy_report.h"
+#include "engine/find_scenes.h"
 #include "engine/render_report.h"
 
 namespace shoal {
@@ -119,7 +120,7 @@ Result<AccuracyJob> make_job(const Arguments& arguments) {
   job.sizes = {picture.width, picture.height, picture.samples, arguments.reference_samples};
   job.seeds = arguments.seeds;
   job.exposure = arguments.exposure;
-  job.may_rebuild = !is_shoal_file(arguments.render.scene);
+  job.may_rebuild = !is_shoal_path(arguments.render.scene);
   SHOAL_ASSIGN_OR_RETURN(job.budget_seconds, parse_duration(arguments.budget));
   SHOAL_ASSIGN_OR_RETURN(job.curve, parse_tone_curve(arguments.tonemap));
   if (!arguments.reference.empty()) SHOAL_RETURN_IF_ERROR(read_reference(arguments.reference, job));

@@ -9,9 +9,8 @@ namespace shoal {
 namespace {
 
 constexpr const char* kModelHelp =
-    "render once more in each order, everything that rays touch through a model of the processor's caches: misses "
-    "and "
-    "memory bytes a ray (default; timed runs are not touched by it)";
+    "do not render once more in each order with everything that rays touch told to a model of the processor's caches: no "
+    "misses and memory bytes a ray are shown (timed runs know nothing of the model)";
 
 /// So many rays take half a minute of processor time by the model of all sets (docs/measuring.md); more are modelled by
 /// one in kSetsOfManyRays.
@@ -50,7 +49,7 @@ uint64_t model_bytes(const CacheModel::Options& options, unsigned threads) {
 }  // namespace
 
 void LevelArguments::declare(CLI::App& app) {
-  app.add_flag("--cache-model,!--no-cache-model", model, kModelHelp);
+  app.add_flag("--no-cache-model{false}", model, kModelHelp);
   app.add_option(
       "--cache-levels", cache_levels,
       "caches to model, the innermost first, as SIZE:WAYS,..., such as 48K:12,2M:16,105M:15; the last of two "

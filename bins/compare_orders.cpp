@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "bins/builder_option.h"
+#include "engine/find_scenes.h"
 #include "engine/hardware_counters.h"
 #include "engine/render_report.h"
 
@@ -185,7 +186,7 @@ const OrderRun& OrderResult::median() const {
 Status check_compare_arguments(const CompareArguments& arguments) {
   SHOAL_RETURN_IF_ERROR(parse_order_choices(arguments.orders));
   for (const std::string& name : arguments.builders) SHOAL_RETURN_IF_ERROR(parse_builder(name));
-  if (!arguments.builders.empty() && is_shoal_file(arguments.render.scene)) {
+  if (!arguments.builders.empty() && is_shoal_path(arguments.render.scene)) {
     return Error{ErrorCode::kUsage, "--builders is of a .gltf or .glb: a .shoal has the trees it was built with"};
   }
   if (!arguments.builders.empty() && arguments.render.builder) {

@@ -18,6 +18,7 @@
 #include "bins/choice_option.h"
 #include "bins/lens_options.h"
 #include "bins/positions_option.h"
+#include "engine/find_scenes.h"
 #include "engine/light_unlit_scene.h"
 #include "engine/render_report.h"
 #include "engine/source_files.h"
@@ -143,8 +144,6 @@ Result<uint64_t> size_or_zero(const std::string& text) {
 }
 
 }  // namespace
-
-bool is_shoal_file(const std::string& path) { return path.ends_with(".shoal"); }
 
 Result<uint64_t> parse_size(const std::string& text) {
   double value = 0;
@@ -280,7 +279,6 @@ void RenderArguments::declare(CLI::App& app) {
       ->capture_default_str()
       ->group("For experiments");
   app.add_option("--packet-size", execution.packet_rays, "orders packet and packet-reorder: rays of a packet, 16 to 256")
-      ->check(CLI::IsMember({16u, 32u, 64u, 128u, 256u}))
       ->capture_default_str()
       ->group("For experiments");
   static const std::map<std::string, ReadBackend> kBackends{
@@ -336,7 +334,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   SHOAL_ASSIGN_OR_RETURN(prepared.execution.page_cache_bytes, size_or_zero(arguments.page_cache));
   SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.environment, chosen_environment(arguments));
   SHOAL_ASSIGN_OR_RETURN(prepared.picture.shading.effects, parse_effects(arguments.effects));
-  if (!arguments.variant.empty() && is_shoal_file(arguments.scene)) {
+  if (!arguments.variant.empty() && is_shoal_path(arguments.scene)) {
     return Error{ErrorCode::kUsage, "--variant is of a .gltf or .glb: a .shoal holds the variant that it was built with"};
   }
   SceneBuildOptions& build = prepared.build;
@@ -352,7 +350,7 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   }
   if (arguments.adjust_build) arguments.adjust_build(build);
   BuiltScene built{arguments.scene, false};
-  if (!is_shoal_file(built.path)) {
+  if (!is_shoal_path(built.path)) {
     SHOAL_ASSIGN_OR_RETURN(built, find_or_build(arguments, prepared, console));
   }
   const ReadMode mode = arguments.buffered_reads ? ReadMode::kBuffered : ReadMode::kDirect;
@@ -362,12 +360,12 @@ Result<PreparedRender> prepare_render(const RenderArguments& arguments, const st
   std::unique_ptr<PageFile> file = std::move(opened).value();
   SHOAL_RETURN_IF_ERROR(fit_cap(*file, orders, pictures_kept, prepared));
   SHOAL_ASSIGN_OR_RETURN(prepared.scene, read_scene(std::move(file), {arguments.more_levels}));
-  if (is_shoal_file(arguments.scene)) {
+  if (is_shoal_path(arguments.scene)) {
     SHOAL_RETURN_IF_ERROR(check_pose(prepared.scene, arguments.pose));
     SHOAL_RETURN_IF_ERROR(check_positions(prepared.scene, arguments.positions));
     SHOAL_RETURN_IF_ERROR(check_builder(prepared.scene, arguments.builder));
   }
-  if (is_shoal_file(arguments.scene) && !arguments.allow_stale) {
+  if (is_shoal_path(arguments.scene) && !arguments.allow_stale) {
     SHOAL_RETURN_IF_ERROR(check_source_is_unchanged(posix_file_system(), prepared.scene));
   }
   SHOAL_RETURN_IF_ERROR(choose_sky(arguments.environment, prepared, console));

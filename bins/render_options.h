@@ -70,8 +70,6 @@ struct PreparedRender {
 /// fit every one of `orders`, beside `pictures_kept` pictures of the same size.
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
                                       uint32_t pictures_kept, Console& console);
-/// Whether a path names a built scene.
-bool is_shoal_file(const std::string& path);
 
 /// Becomes true at SIGINT or SIGTERM, from this call on. One that comes more than a second later ends the process at once,
 /// with code 9.

@@ -44,7 +44,7 @@ Status check_options(const Scene& scene, const PictureOptions& picture, const Ex
   }
   if (execution.packet_rays < kLeastPacketRays || execution.packet_rays > kMostPacketRays ||
       !std::has_single_bit(execution.packet_rays)) {
-    return Error{ErrorCode::kUsage, fmt::format("packets of {} rays: expected a power of two from {} to {}",
+    return Error{ErrorCode::kUsage, fmt::format("--packet-size {}: expected a power of two from {} to {}",
                                                 execution.packet_rays, kLeastPacketRays, kMostPacketRays)};
   }
   if (execution.time_limit_seconds > 0 && picture.range.count() > 0) {

@@ -59,7 +59,7 @@ TEST(HelpPages, TheManualNamesEveryCommandAndOption) {
     for (const std::string& option : options)
       EXPECT_THAT(section, HasSubstr("\\fB" + escaped(option) + "\\fR")) << command;
   }
-  EXPECT_THAT(manual, HasSubstr("a corrupt .shoal file"));
+  EXPECT_THAT(manual, HasSubstr("a corrupt .shoal"));
 }
 
 TEST(HelpPages, TheManualIsSoundRoff) {
@@ -97,9 +97,10 @@ TEST(HelpPages, BashCompletesCommandsOptionsAndChoices) {
   EXPECT_THAT(bash_offers(folder, {"shoal", "ren"}), ElementsAre("render"));
   EXPECT_THAT(bash_offers(folder, {"shoal", "render", "a.shoal", "--max-m"}), ElementsAre("--max-memory"));
   EXPECT_THAT(bash_offers(folder, {"shoal", "render", "--order", ""}),
-              ElementsAre("auto", "queued", "depth-first", "sorted", "hybrid"));
+              ElementsAre("auto", "queued", "depth-first", "sorted", "hybrid", "packet", "packet-reorder", "stream",
+                          "depth-first-while-while", "depth-first-if-if"));
   EXPECT_THAT(bash_offers(folder, {"shoal", "render", "--order", "=", "qu"}), ElementsAre("queued"));
-  EXPECT_THAT(bash_offers(folder, {"shoal", "render", "--order", "="}).size(), 5u);
+  EXPECT_THAT(bash_offers(folder, {"shoal", "render", "--order", "="}).size(), 10u);
   EXPECT_THAT(bash_offers(folder, {"shoal", "render", "--policy", "res"}), ElementsAre("resident-first"));
   EXPECT_THAT(bash_offers(folder, {"shoal", "batch", "scenes", "--sampl"}), ElementsAre("--sampler"));
   EXPECT_THAT(bash_offers(folder, {"shoal", "render", "re"}), ElementsAre("reef one.gltf"));
