@@ -73,6 +73,8 @@ class alignas(64) PhaseClock {
     ticks_[static_cast<size_t>(other)] += given;
   }
   uint64_t ticks(Phase phase) const { return ticks_[static_cast<size_t>(phase)]; }
+  /// Until when the time is some phase's.
+  uint64_t settled_at() const { return since_; }
 
  private:
   uint64_t since_;

@@ -92,10 +92,9 @@ void RenderRecord::end(std::span<PhaseClock> clocks) {
   cache_->take_loaded(pages);
   for (const PageId page : pages) read_finished(page);
   timeline_.stop();
-  const uint64_t now = now_ticks();
   course_.heat = std::move(reads_->heat);
   for (size_t i = 0; i < threads_.size(); ++i) {
-    threads_[i]->finish(clocks[i], now);
+    threads_[i]->finish(clocks[i], clocks[i].settled_at());  // as the render's own times, whatever was waited for since
     course_.heat.add(threads_[i]->heat());
   }
   course_.timeline = timeline_.timeline().samples();
