@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "bins/report_assets.h"
@@ -18,6 +19,8 @@ constexpr const char* kNoPlots =
 
 /// Longer texts in tables stand on the left, as sentences do, shorter ones on the right, as numbers do.
 constexpr size_t kLongestOnTheRight = 16;
+
+bool is_words(const ReportCell& cell) { return !cell.value && cell.text.size() > kLongestOnTheRight; }
 
 /// JSON may hold "</script>" and "<!--" in strings, which would end the element early.
 std::string in_script(const std::string& json) {
@@ -52,13 +55,17 @@ struct Writer {
 
   void operator()(const ReportTable& block) {
     html += "<div class=\"scroll\"><table>\n<thead><tr>";
-    for (const std::string& head : block.head) html += fmt::format("<th>{}</th>", html_escape(head));
+    for (size_t column = 0; column < block.head.size(); ++column) {
+      const bool words = std::any_of(block.rows.begin(), block.rows.end(), [&](const ReportTable::Row& row) {
+        return column < row.cells.size() && is_words(row.cells[column]);
+      });
+      html += fmt::format("<th{}>{}</th>", words && column > 0 ? " class=\"text\"" : "", html_escape(block.head[column]));
+    }
     html += "</tr></thead>\n<tbody>\n";
     for (const ReportTable::Row& row : block.rows) {
       html += row.marked ? "<tr class=\"marked\">" : "<tr>";
       for (const ReportCell& cell : row.cells) {
-        const bool words = &cell != &row.cells.front() && !cell.value && cell.text.size() > kLongestOnTheRight;
-        html += words ? "<td class=\"text\"" : "<td";
+        html += &cell != &row.cells.front() && is_words(cell) ? "<td class=\"text\"" : "<td";
         if (cell.value) html += fmt::format(" data-value=\"{}\"", *cell.value);
         if (!cell.path.empty()) html += fmt::format(" data-path=\"{}\"", html_escape(cell.path));
         html += fmt::format(">{}</td>", html_escape(cell.text));

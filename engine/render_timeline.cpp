@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <system_error>
-
-#include "engine/clock.h"
 
 namespace shoal {
 namespace {
@@ -13,6 +12,13 @@ namespace {
 constexpr double kLookShare = 0.02;
 /// A thread that is woken a little early still brings the sample that is due.
 constexpr double kEarlyShare = 0.1;
+
+/// Of this thread: what a look costs, and not how long it waited for its turn on a busy machine.
+double thread_cpu_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 }  // namespace
 
@@ -60,9 +66,9 @@ void TimelineThread::run() {
   std::unique_lock lock(mutex_);
   while (!stopped_) {
     lock.unlock();
-    const double start = now_seconds();
+    const double start = thread_cpu_seconds();
     timeline_.add(look_());
-    const double least = (now_seconds() - start) / kLookShare;
+    const double least = (thread_cpu_seconds() - start) / kLookShare;
     lock.lock();
     const double seconds = std::max(least, std::min(timeline_.interval_seconds(), most_seconds_));
     wake_.wait_for(lock, std::chrono::duration<double>(seconds), [this] { return stopped_; });
