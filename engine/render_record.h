@@ -7,7 +7,7 @@
 //   threads    begin() and end() by the thread that renders, while no other works; thread(i) by the i-th of them; watch()
 //              and the reads ahead by any.
 //   cost       off: a test of a pointer where something would be noted. On: see engine/thread_record.h and
-//              engine/render_timeline.h; measured in docs/compare.md.
+//              engine/render_timeline.h.
 #pragma once
 
 #include <functional>
