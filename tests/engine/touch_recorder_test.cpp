@@ -116,10 +116,12 @@ TEST_F(TouchRecorderTest, EachLevelIsAskedForWhatTheOneInFrontLacks) {
     for (const LineCounts& kind : report.by_kind) sum.fills += kind.fills, sum.write_backs += kind.write_backs;
     EXPECT_EQ(sum.fills, report.memory.fills);
     EXPECT_EQ(sum.write_backs, report.memory.write_backs);
-    for (const TouchKind kind :
-         {TouchKind::kTopTree, TouchKind::kNodes, TouchKind::kLeaves, TouchKind::kPathStates}) {
-      EXPECT_GT(report.by_kind[static_cast<size_t>(kind)].fills, 0u) << kTouchKindNames[static_cast<size_t>(kind)];
-    }
+    const auto fills = [&](TouchKind kind) { return report.by_kind[static_cast<size_t>(kind)].fills; };
+    EXPECT_GT(fills(TouchKind::kTopTree), 0u);
+    EXPECT_GT(fills(TouchKind::kPathStates), 0u);
+    // Where a thread decodes pages itself, their nodes and leaves may be in its caches from then on.
+    EXPECT_GT(fills(TouchKind::kNodes) + fills(TouchKind::kPages), 0u);
+    EXPECT_GT(fills(TouchKind::kLeaves) + fills(TouchKind::kPages), 0u);
     const bool sorts = order == Order::kSorted;
     EXPECT_EQ(report.by_kind[static_cast<size_t>(TouchKind::kSorting)].fills > 0, sorts);
   }
