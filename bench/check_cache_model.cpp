@@ -3,9 +3,8 @@
 // and told to the model of the same two levels. Exit code 1 where the misses of either level differ by more than
 // --tolerance, 77 where there is no valgrind. docs/measuring.md "Traffic at each level".
 //
-//   bench/check_cache_model [--triangles N] [--rays N] [--workload W] [--d1 32K:8] [--ll 512K:16] [--tolerance
-//   0.05]
-//       [--folder DIR] [--json F]
+//   bench/check_cache_model [--triangles N] [--rays N] [--workload W] [--d1 48K:12] [--ll 256K:16]
+//       [--tolerance 0.05] [--folder DIR] [--json F]
 //
 // The program starts itself under valgrind: once with --model-into, which leaves what the model says of a pass, and
 // for two numbers of passes with --passes, whose difference is what cachegrind says of one. Both under valgrind, so
@@ -35,9 +34,9 @@ constexpr int kNoValgrind = 77;
 constexpr uint32_t kFewPasses = 1, kManyPasses = 3;
 
 struct Arguments {
-  GivenScene scene{.path = "", .triangles = 120'000};
-  uint64_t rays = 5'000;
-  std::string workload = "scene-random", d1 = "32K:8", ll = "512K:16", json;
+  GivenScene scene{.path = "", .triangles = 20'000};
+  uint64_t rays = 10'000;
+  std::string workload = "scene-random", d1 = "48K:12", ll = "256K:16", json;
   std::string folder = fs::temp_directory_path().string();
   double tolerance = 0.05;
   bool scalar = false;
