@@ -154,7 +154,7 @@ class RenderRecordOf : public ::testing::Test {
     auto scene = open_scene(fs, folder_ / "scene.shoal", ReadMode::kDirect, {});
     ASSERT_TRUE(scene.ok()) << scene.error().message;
     scene_ = std::move(scene).value();
-    picture_.width = 64, picture_.height = 48, picture_.samples = 4;
+    picture_.width = 40, picture_.height = 30, picture_.samples = 2;
   }
 
   RenderResult rendered(Order order, RenderRecord* record) {
@@ -163,7 +163,7 @@ class RenderRecordOf : public ::testing::Test {
     execution.threads = 3;
     execution.record = record;
     execution.rays_in_flight = 4000;
-    if (order != Order::kHybrid) execution.page_cache_bytes = 256 * 1024;
+    if (order != Order::kHybrid) execution.page_cache_bytes = 384 * 1024;
     auto result = render(posix_file_system(), scene_, picture_, execution);
     EXPECT_TRUE(result.ok()) << result.error().message;
     return result.ok() ? std::move(result).value() : RenderResult{};
