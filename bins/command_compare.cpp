@@ -93,9 +93,10 @@ void declare_compare(CLI::App& app, Console& console, Command& command) {
       ->delimiter(',')
       ->capture_default_str();
   sub->add_option("--builders", arguments->builders,
-                  "comma-separated: sah, lbvh, karras; every order over the trees of each builder, as lbvh/queued")
+                  "comma-separated: sah, lbvh, karras; every order over the trees of each builder, as lbvh/queued "
+                  "(of a .gltf or .glb only)")
       ->delimiter(',');
-  sub->add_option("--out", arguments->out, "folder for report.html, compare.json and .csv")->required();
+  sub->add_option("--out", arguments->out, "folder for report.html, compare.json and CSV files")->required();
   sub->add_option("--runs", arguments->runs, "of each order, in turns; the one of median time is shown")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -9,7 +9,7 @@ namespace shoal {
 namespace {
 
 constexpr const char* kModelHelp =
-    "do not render once more in each order with everything that rays touch told to a model of the processor's caches: no "
+    "do not render once more in each order with what tracing touches told to a model of the processor's caches: no "
     "misses and memory bytes a ray are shown (timed runs know nothing of the model)";
 
 /// So many rays take half a minute of processor time by the model of all sets (docs/measuring.md); more are modelled by
