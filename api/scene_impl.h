@@ -2,6 +2,8 @@
 #pragma once
 
 #include <new>
+#include <string>
+#include <system_error>
 
 #include "engine/scene.h"
 #include "shoal/result.h"
@@ -32,6 +34,8 @@ Result<T> within_memory(const Work& work) {
     return work();
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kMemoryCap, "out of memory: lower max_memory_bytes to what the machine has"};
+  } catch (const std::system_error& error) {  // no thread can be had
+    return Error{ErrorCode::kMemoryCap, std::string("the system refuses what is needed: ") + error.what()};
   }
 }
 

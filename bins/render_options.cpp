@@ -29,7 +29,7 @@ namespace {
 
 // The only globals: a signal handler can reach nothing else.
 std::atomic<bool> g_stop{false};
-std::atomic<int64_t> g_stop_ns{0};  ///< when that became true
+std::atomic<int64_t> g_stop_ns{0};  ///< when it was asked for; 0: not yet
 
 int64_t monotonic_ns() {
   timespec now{};
@@ -43,9 +43,10 @@ constexpr int64_t kSameSignalNs = 1'000'000'000;
 /// The first asks to stop, a later one ends the process at once.
 void on_signal(int) {
   const int64_t now = monotonic_ns();
-  if (!g_stop.exchange(true)) {
-    g_stop_ns = now;
-  } else if (now - g_stop_ns > kSameSignalNs) {
+  int64_t first = 0;
+  if (g_stop_ns.compare_exchange_strong(first, now)) {
+    g_stop = true;
+  } else if (now - first > kSameSignalNs) {
     ::_exit(static_cast<int>(ErrorCode::kStopped));
   }
 }

@@ -279,8 +279,10 @@ class BatchRun {
       alone_.push_back(render.entry);
       return {};
     }
-    // A checkpoint that is damaged, or of a scene that was built with another share of memory: without it.
-    const bool refused = render.resumed && (record.exit_code == kInputExit || record.exit_code == kCorruptExit);
+    // A checkpoint that is damaged, or of a scene that was built with another share of memory: without it. What else is
+    // damaged or missing is no fault of the checkpoint's.
+    const bool refused = render.resumed && (record.exit_code == kInputExit || record.exit_code == kCorruptExit) &&
+                         record.message.find(".checkpoint") != std::string::npos;
     if (refused && !told_) {
       remove_checkpoint(entry.scene);
       return start(render.entry, render.taken);

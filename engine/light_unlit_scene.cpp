@@ -25,6 +25,8 @@ Result<std::vector<float>> probe_luminances(FileSystem& fs, const Scene& scene, 
   unseen.preview = {};
   unseen.checkpoint = {};
   unseen.sums_path.clear();
+  unseen.record = nullptr;
+  unseen.touches = nullptr;
   unseen.time_limit_seconds = 0;  // the lamp is that of these samples
   SHOAL_ASSIGN_OR_RETURN(const RenderResult result, render(fs, scene, probe, unseen));
   std::vector<float> values;

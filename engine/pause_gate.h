@@ -14,6 +14,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <vector>
@@ -81,6 +82,7 @@ class PauseGate {
     }
     ~Member() {
       const std::lock_guard guard(gate_.mutex_);
+      gate_.spoiled_ = gate_.spoiled_ || std::uncaught_exceptions() > exceptions_;
       --gate_.members_;
       gate_.changed_.notify_all();
     }
@@ -89,6 +91,7 @@ class PauseGate {
 
    private:
     PauseGate& gate_;
+    const int exceptions_ = std::uncaught_exceptions();
   };
 
   bool paused() const { return paused_.load(std::memory_order_relaxed); }
@@ -99,14 +102,15 @@ class PauseGate {
     wait(lock);
   }
 
-  /// Runs `work` while all other members wait. Does nothing but wait when another is alone already. Requires: the caller is
-  /// a member at a safe point.
+  /// Runs `work` while all other members wait. Does nothing but wait when another is alone already, and nothing once a member
+  /// has left by an exception: what it had begun is known to nobody. Requires: the caller is a member at a safe point.
   void alone(const std::function<void()>& work) {
     std::unique_lock lock(mutex_);
     if (paused()) return wait(lock);
     const Ending ending{*this, lock};
     paused_ = true;
     changed_.wait(lock, [this] { return waiting_ + 1 == members_; });
+    if (spoiled_) return;
     lock.unlock();
     work();
   }
@@ -140,6 +144,7 @@ class PauseGate {
   std::condition_variable changed_;
   std::atomic<bool> paused_{false};
   uint32_t members_ = 0, waiting_ = 0;
+  bool spoiled_ = false;  ///< a member left by an exception
   std::vector<const UnfinishedPaths*> sources_;
 };
 

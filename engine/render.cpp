@@ -254,11 +254,11 @@ Result<RenderResult> render(FileSystem& fs, const Scene& scene, const PictureOpt
                                                hooks.warning);
   }
   context.record = execution.record;
+  const RecordedScope recorded(context.record, context.phases);  // of a beginning that fails, too
   if (context.record != nullptr) {
     SHOAL_RETURN_IF_ERROR(context.record->begin(scene, orders.page_treelets(), cache, execution.threads,
                                                 plan.read_depth, start_ticks, start));
   }
-  const RecordedScope recorded(context.record, context.phases);
   foretell(context, sums.adaptive ? 0 : pixels * range.count(), execution.time_limit_seconds);
   render_passes(context, passes, samples, orders);
   orders.release();

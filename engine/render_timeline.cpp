@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <new>
 #include <system_error>
 
 namespace shoal {
@@ -67,7 +68,10 @@ void TimelineThread::run() {
   while (!stopped_) {
     lock.unlock();
     const double start = thread_cpu_seconds();
-    timeline_.add(look_());
+    try {
+      timeline_.add(look_());
+    } catch (const std::bad_alloc&) {  // a look is missing then; the render is told by whoever needs memory
+    }
     const double least = (thread_cpu_seconds() - start) / kLookShare;
     lock.lock();
     const double seconds = std::max(least, std::min(timeline_.interval_seconds(), most_seconds_));

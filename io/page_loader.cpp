@@ -6,6 +6,7 @@
 #include <new>
 #include <thread>
 #include <vector>
+#include <system_error>
 
 #include "io/aligned_buffer.h"
 #include "io/async_reader.h"
@@ -100,7 +101,11 @@ PageLoader::PageLoader(const PageFile& file, const PagingOptions& options, Finis
     return;
   }
   for (size_t i = 0; i < s.slots.size(); ++i) s.slots[i].stored = memory.value().subspan(i * s.slot_bytes, s.slot_bytes);
-  for (unsigned i = 0; i < std::max(1u, options.loader_threads); ++i) s.threads.emplace_back([&s] { s.serve(); });
+  try {
+    for (unsigned i = 0; i < std::max(1u, options.loader_threads); ++i) s.threads.emplace_back([&s] { s.serve(); });
+  } catch (const std::system_error&) {  // no more threads: those that there are serve, or nothing is read ahead
+    if (s.threads.empty()) s.free_slots.clear();
+  }
 }
 
 PageLoader::~PageLoader() {

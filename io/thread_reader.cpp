@@ -3,6 +3,7 @@
 #include <mutex>
 #include <thread>
 #include <vector>
+#include <system_error>
 
 #include "io/async_reader.h"
 
@@ -12,7 +13,11 @@ namespace {
 class ThreadReader final : public AsyncReader {
  public:
   ThreadReader(unsigned depth, unsigned threads) : depth_(depth) {
-    for (unsigned i = 0; i < threads; ++i) threads_.emplace_back([this] { serve(); });
+    try {
+      for (unsigned i = 0; i < threads; ++i) threads_.emplace_back([this] { serve(); });
+    } catch (const std::system_error&) {  // no more threads: those that there are serve
+      if (threads_.empty()) throw;
+    }
   }
   ~ThreadReader() override {
     {

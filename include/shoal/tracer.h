@@ -14,7 +14,9 @@
 // or of what else is in the batch.
 //
 // Threads: a Scene is immutable, any number may use it. A Tracer works on threads of its own; calls to trace() of one
-// tracer wait for each other. Several tracers of one scene are independent, each with a cap and a cache of its own.
+// tracer wait for each other. Several tracers of one scene are independent, each with a cap and a cache of its own;
+// but how many threads oneTBB may use is one number for the process: while batches are traced, the least that any of them
+// was given.
 // Batches: the larger the better, as rays of a batch are gathered by the part of the scene that they are in; below some
 // ten thousand an out-of-core scene is read again and again. Pages stay in memory from batch to batch.
 // Moved from, a Scene or Tracer can only be destroyed or assigned to.
