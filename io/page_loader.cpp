@@ -4,9 +4,9 @@
 #include <atomic>
 #include <mutex>
 #include <new>
+#include <system_error>
 #include <thread>
 #include <vector>
-#include <system_error>
 
 #include "io/aligned_buffer.h"
 #include "io/async_reader.h"

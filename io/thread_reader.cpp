@@ -1,9 +1,9 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
-#include <system_error>
 
 #include "io/async_reader.h"
 
