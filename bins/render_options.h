@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bins/console.h"
+#include "bins/stop_signals.h"
 #include "engine/build_scene.h"
 #include "engine/render.h"
 #include "io/result.h"
@@ -71,9 +72,6 @@ struct PreparedRender {
 Result<PreparedRender> prepare_render(const RenderArguments& arguments, const std::vector<Order>& orders,
                                       uint32_t pictures_kept, Console& console);
 
-/// Becomes true at SIGINT or SIGTERM, from this call on. One that comes more than a second later ends the process at once,
-/// with code 9.
-const std::atomic<bool>* stop_on_signals();
 /// Hooks that show progress and stop on SIGINT and SIGTERM.
 RenderHooks console_hooks(Console& console);
 /// The memory plan as one log line.
