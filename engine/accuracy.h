@@ -49,7 +49,6 @@ struct AccuracyHooks {
   std::function<Result<AccuracyScene>(const std::function<void(SceneBuildOptions&)>& change)> open;
   std::function<void()> close;  ///< may be empty; lets go of what was opened: only the base is used until the next open()
   std::function<void(const std::string& stage, double fraction, double seconds)> progress;  ///< may be empty
-  std::function<void(const std::string&)> note;                                              ///< may be empty
   const std::atomic<bool>* stop = nullptr;
 };
 

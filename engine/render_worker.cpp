@@ -158,7 +158,7 @@ Ray RenderWorker::begin_listed(uint64_t index, uint32_t path_index, PathState& p
   Ray ray = context_.list->begin(index, path);
   ray.path = path_index | (context_.list->any_hit() ? Ray::kAnyHitBit : 0u);
   ++counters_.samples_started_count;
-  counters_.path_state_moved_bytes += sizeof(PathState);
+  move_state(path);
   ++ray_counters(ray).rays_traced_count;
   return ray;
 }
@@ -192,7 +192,7 @@ uint32_t RenderWorker::shade(uint32_t path_index, PathState& path, Ray rays[2]) 
   if (context_.list != nullptr) {
     context_.list->find_point(path, context_.scene.top_tree, geometry_.bytes());
     ++shade_counters_.vertices_shaded_count;
-    counters_.path_state_moved_bytes += sizeof(PathState);
+    move_state(path);
     path.flags &= ~uint32_t{kPathGoesOn};
     return 0;
   }
@@ -261,7 +261,7 @@ void RenderWorker::end_path(PathState& path) {
   path.under_way = 0;
   if (context_.list != nullptr) {
     ++counters_.samples_committed_count;
-    counters_.path_state_moved_bytes += sizeof(PathState);
+    move_state(path);
     return;
   }
   Vec3 radiance = path.radiance;

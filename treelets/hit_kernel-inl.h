@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
+
 #include "treelets/leaf_test.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -161,6 +163,22 @@ HWY_INLINE bool intersect_stored_by(const RaySpace& ray, const LeafView& leaf, u
   if constexpr (kTest == TriangleTest::kWatertight) return intersect_stored(ray, leaf, i, t_max, hit);
   if constexpr (kTest == TriangleTest::kFast) return intersect_stored_fast(ray, leaf, i, t_max, hit);
   return intersect_triangle<kTest>(ray, leaf.position(i, 0), leaf.position(i, 1), leaf.position(i, 2), t_max, hit);
+}
+
+/// Tests those triangles of a leaf in turn, nearer hits taking the place of earlier ones; `id`: of the treelet. Returns true
+/// when an any-hit ray is done. Requires: as intersect_stored_by().
+template <TriangleTest kTest>
+HWY_INLINE bool test_candidates(const TreeletView& treelet, const LeafView& leaf, uint32_t offset, uint32_t candidates,
+                                const RaySpace& space, Ray& ray, TreeletId id, TraceCounters& counters) {
+  for (; candidates != 0; candidates &= candidates - 1) {
+    const auto i = static_cast<uint32_t>(std::countr_zero(candidates));
+    TriangleHit hit;
+    if (intersect_stored_by<kTest>(space, leaf, i, ray.t, hit) &&
+        take_hit(treelet, leaf, offset, i, hit, ray, id, counters)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace HWY_NAMESPACE

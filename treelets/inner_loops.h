@@ -13,7 +13,7 @@
 
 namespace shoal {
 
-void trace_while_while(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test);
-void trace_if_if(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test);
+/// Requires: kWhileWhile or kIfIf.
+void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop);
 
 }  // namespace shoal

@@ -218,23 +218,14 @@ class StreamWalk {
       const uint32_t ray = s_.current[i];
       s_.work[ray].triangle_tests += leaf.triangle_count;
       const uint32_t candidates = find_candidates<kTest>(s_.object[ray], leaf, s_.rays[ray]->t);
-      if (candidates != 0) s_.gone[ray] = test_candidates(leaf, leaf_offset(ref), candidates, ray);
+      if (candidates != 0) s_.gone[ray] = test_leaf(leaf, leaf_offset(ref), candidates, ray);
     }
   }
 
   /// True when an any-hit ray is done.
-  HWY_INLINE bool test_candidates(const LeafView& leaf, uint32_t offset, uint32_t candidates, uint32_t index) {
-    const TreeletView treelet(scope().page);
-    Ray& ray = *s_.rays[index];
-    for (; candidates != 0; candidates &= candidates - 1) {
-      const auto i = static_cast<uint32_t>(std::countr_zero(candidates));
-      TriangleHit hit;
-      if (intersect_stored_by<kTest>(s_.object[index], leaf, i, ray.t, hit) &&
-          take_hit(treelet, leaf, offset, i, hit, ray, scope().entry.treelet, counters_)) {
-        return true;
-      }
-    }
-    return false;
+  HWY_INLINE bool test_leaf(const LeafView& leaf, uint32_t offset, uint32_t candidates, uint32_t ray) {
+    return test_candidates<kTest>(TreeletView(scope().page), leaf, offset, candidates, s_.object[ray], *s_.rays[ray],
+                                  scope().entry.treelet, counters_);
   }
 
   const SceneTables& tables_;

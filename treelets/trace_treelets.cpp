@@ -45,7 +45,7 @@ void add_tests(std::span<const TraceJob> jobs, TraceCounters& counters) {
 
 void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
   if (HWY_UNLIKELY(loop != InnerLoop::kMoreNumerous)) {
-    (loop == InnerLoop::kWhileWhile ? trace_while_while : trace_if_if)(jobs, counters, test);
+    trace_lock_step(jobs, counters, test, loop);
   } else if (HWY_LIKELY(test == TriangleTest::kWatertight)) {
     HWY_DYNAMIC_DISPATCH(trace)(jobs, counters);
   } else {

@@ -46,7 +46,7 @@ TEST_F(CheckpointFaults, AtAnyFileCallTheOldOrTheNewOneIsWhole) {
 
 TEST_F(CheckpointFaults, ADiskThatIsFullIsSaidOnceAndTheRenderGoesOn) {
   const RenderResult expected = whole();
-  for (const RenderWay& way : {kRenderWays[0], kRenderWays[1], kRenderWays[2], kRenderWays[3]}) {
+  for (const RenderVariation& way : {kRenderWays[0], kRenderWays[1], kRenderWays[2], kRenderWays[3]}) {
     warnings_.clear();
     faulty_.arm(Fault::kDiskFull, 0, true);
     const auto result = rendered(faulty_, way, {.path = kCheckpoint, .every_seconds = 1e-4});

@@ -31,7 +31,7 @@ TEST_F(Checkpoint, StoppedAnywhereAndResumedInAnyWayThePictureHasTheSameBits) {
 TEST_F(Checkpoint, StoppedAtOnceWhileThreadsTakeTheirFirstSamplesNothingIsLost) {
   const RenderResult expected = whole();
   for (uint32_t round = 0; round < 24; ++round) {
-    const RenderWay& way = kRenderWays[round % 3 == 0 ? round / 3 % std::size(kRenderWays) : 0];
+    const RenderVariation& way = kRenderWays[round % 3 == 0 ? round / 3 % std::size(kRenderWays) : 0];
     files_.remove(kCheckpoint).ok();
     for (int stop = 0; stop < 2; ++stop) ASSERT_FALSE(stopped_after(0, way, files_).ok()) << way.name;
     const auto result = resumed(kRenderWays[3]);
@@ -75,7 +75,7 @@ TEST_F(Checkpoint, ATimeLimitCountsWhatWentBefore) {
 
 TEST_F(Checkpoint, CheckpointsWrittenWhileItRunsChangeNothingAndCanBeGoneOnWith) {
   const RenderResult expected = whole();
-  for (const RenderWay& way : kRenderWays) {
+  for (const RenderVariation& way : kRenderWays) {
     const auto result = rendered(files_, way, {.path = kCheckpoint, .every_seconds = 1e-4});
     ASSERT_TRUE(result.ok()) << result.error().message;
     expect_same(result.value(), expected, way.name);

@@ -10,7 +10,7 @@ namespace {
 
 class MergeSums : public StoppedRender {
  protected:
-  void render_part(const std::string& path, SampleSpan range, const RenderWay& way = kRenderWays[0]) {
+  void render_part(const std::string& path, SampleSpan range, const RenderVariation& way = kRenderWays[0]) {
     sums_path_ = path;
     picture_.range = range;
     const auto result = rendered(files_, way, {});

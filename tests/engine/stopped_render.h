@@ -12,23 +12,14 @@
 #include "engine/clock.h"
 #include "engine/generate.h"
 #include "engine/render.h"
-#include "io/page_cache.h"
 #include "tests/support/memory_file_system.h"
+#include "tests/support/render_variation.h"
 #include "tests/support/temporary_folder.h"
 
 namespace shoal::testing {
 
-struct RenderWay {
-  const char* name;
-  Order order = Order::kQueued;
-  unsigned threads = 2;
-  uint64_t rays_in_flight = 0;
-  bool smallest_cache = false;
-  bool preview = false;
-};
-
-inline const RenderWay kPlainWay{.name = "depth-first, one thread", .order = Order::kDepthFirst, .threads = 1};
-inline const RenderWay kRenderWays[] = {
+inline const RenderVariation kPlainWay{.name = "depth-first, one thread", .order = Order::kDepthFirst, .threads = 1};
+inline const RenderVariation kRenderWays[] = {
     {.name = "queued", .threads = 3},
     {.name = "depth-first", .order = Order::kDepthFirst},
     {.name = "sorted", .order = Order::kSorted, .threads = 3},
@@ -66,35 +57,27 @@ class StoppedRender : public ::testing::Test {
     picture_.aovs = parse_aovs("albedo,normal,depth,position,variance,samples,object_id,material_id").value();
   }
 
-  Result<RenderResult> rendered(FileSystem& fs, const RenderWay& way, const CheckpointOptions& checkpoint,
+  Result<RenderResult> rendered(FileSystem& fs, const RenderVariation& way, const CheckpointOptions& checkpoint,
                                 const std::atomic<bool>* stop = nullptr) {
-    const ReadMode mode = way.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
-    const auto scene = open_scene(posix_file_system(), folder_ / "scene.shoal", mode, {});
     ExecutionOptions execution;
-    execution.order = way.order;
-    execution.threads = way.threads;
-    execution.rays_in_flight = way.rays_in_flight;
     execution.time_limit_seconds = time_limit_;
     execution.checkpoint = checkpoint;
     execution.sums_path = sums_path_;
-    if (way.smallest_cache) {
-      execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, way.threads);
-    }
-    if (way.preview) execution.preview.path = "preview.png";
+    if (way.preview) execution.preview.path = "preview.png";  // in `fs`
     RenderHooks hooks;
     hooks.stop = stop;
     hooks.warning = [this](const std::string& warning) { warnings_.push_back(warning); };
-    return render(fs, scene.value(), picture_, execution, hooks);
+    return try_variation(fs, folder_, picture_, way, execution, hooks);
   }
 
-  RenderResult whole(const RenderWay& way = kPlainWay) {
+  RenderResult whole(const RenderVariation& way = kPlainWay) {
     auto result = rendered(files_, way, {});
     if (!result.ok()) throw std::runtime_error(result.error().message);
     return std::move(result).value();
   }
 
   /// Stops it after so many seconds, if it takes as long.
-  Result<RenderResult> stopped_after(double seconds, const RenderWay& way, FileSystem& fs) {
+  Result<RenderResult> stopped_after(double seconds, const RenderVariation& way, FileSystem& fs) {
     std::atomic<bool> stop{seconds <= 0};
     std::atomic<bool> over{false};
     std::thread stopper([&] {
@@ -109,14 +92,14 @@ class StoppedRender : public ::testing::Test {
   }
 
   /// Makes a checkpoint of a render that has done something.
-  void make_checkpoint(const RenderWay& way = kRenderWays[0]) {
+  void make_checkpoint(const RenderVariation& way = kRenderWays[0]) {
     for (double seconds = 0.02; !files_.exists(kCheckpoint); seconds *= 0.7) {
       const auto result = stopped_after(seconds, way, files_);
       ASSERT_TRUE(result.ok() || result.error().code == ErrorCode::kStopped) << result.error().message;
     }
   }
 
-  Result<RenderResult> resumed(const RenderWay& way = kPlainWay) {
+  Result<RenderResult> resumed(const RenderVariation& way = kPlainWay) {
     return rendered(files_, way, {.path = kCheckpoint, .resume = true});
   }
 
@@ -143,7 +126,7 @@ class StoppedRender : public ::testing::Test {
       files_.remove(kCheckpoint).ok();
       std::string ways;
       for (uint32_t part = 0;; ++part) {
-        const RenderWay& way = kRenderWays[random() % std::size(kRenderWays)];
+        const RenderVariation& way = kRenderWays[random() % std::size(kRenderWays)];
         ways += std::string(way.name) + "; ";
         const double longest = part < 6 ? 0.6 * expected.seconds : 100;
         const auto result = stopped_after(longest * (random() % 1000) * 1e-3, way, files_);

@@ -20,9 +20,9 @@ struct RenderVariation {
   bool preview = false;
 };
 
-/// Renders `folder`/scene.shoal; `execution` holds what is no part of the variation. Throws when anything fails.
-inline RenderResult render_variation(const TemporaryFolder& folder, const PictureOptions& picture, const RenderVariation& v,
-                                     ExecutionOptions execution = {}, const RenderHooks& hooks = {}) {
+/// Renders `folder`/scene.shoal; `execution` holds what is no part of the variation. What the render writes goes through `fs`.
+inline Result<RenderResult> try_variation(FileSystem& fs, const TemporaryFolder& folder, const PictureOptions& picture,
+                                          const RenderVariation& v, ExecutionOptions execution, const RenderHooks& hooks) {
   const ReadMode mode = v.smallest_cache ? ReadMode::kDirect : ReadMode::kBuffered;
   const auto scene = open_scene(posix_file_system(), folder / "scene.shoal", mode, {});
   if (!scene.ok()) throw std::runtime_error(scene.error().message);
@@ -32,8 +32,14 @@ inline RenderResult render_variation(const TemporaryFolder& folder, const Pictur
   if (v.smallest_cache) {
     execution.page_cache_bytes = PageCache::minimum_capacity_bytes(*scene.value().file, v.threads);
   }
-  if (v.preview) execution.preview.path = folder / "preview.png";
-  auto result = render(posix_file_system(), scene.value(), picture, execution, hooks);
+  if (v.preview && execution.preview.path.empty()) execution.preview.path = folder / "preview.png";
+  return render(fs, scene.value(), picture, execution, hooks);
+}
+
+/// The same. Throws when anything fails.
+inline RenderResult render_variation(const TemporaryFolder& folder, const PictureOptions& picture, const RenderVariation& v,
+                                     const ExecutionOptions& execution = {}, const RenderHooks& hooks = {}) {
+  auto result = try_variation(posix_file_system(), folder, picture, v, execution, hooks);
   if (!result.ok()) throw std::runtime_error(result.error().message);
   return std::move(result).value();
 }
