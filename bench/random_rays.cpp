@@ -12,6 +12,7 @@
 #include "engine/path_ray.h"
 #include "engine/queued_paths.h"
 #include "engine/render_worker.h"
+#include "engine/run_on_threads.h"
 #include "engine/surface_error.h"
 #include "engine/treelet_scheduler.h"
 #include "treelets/treelet_view.h"

@@ -10,7 +10,7 @@
 #include <span>
 
 #include "engine/math.h"
-#include "engine/render_worker.h"
+#include "engine/run_on_threads.h"
 
 namespace shoal {
 namespace {

@@ -1,5 +1,5 @@
 // Parts of a picture, rendered anywhere, made one: the raw sums of ranges of samples are added, which gives the bits of one
-// render. Called by bins/command_merge, and by engine/render for what a part says of its picture.
+// render. Called by bins/command_merge.
 // Thread rule: plain functions. Memory: the sums of the picture and its layers, then their floats (the memory plan of a
 // render has the same under film and AOVs). Cost: reads every part once.
 #pragma once
@@ -22,9 +22,5 @@ struct MergedPicture {
 /// Fails with: kInput (parts of different pictures, that overlap, or with samples missing: the message says which; no
 /// part), kCorrupt, kStorage.
 Result<MergedPicture> merge_parts(FileSystem& fs, const std::vector<std::string>& paths);
-
-/// The attributes of an image without its channels, and back. Fails with: kCorrupt (it was not written by that).
-std::string attributes_text(const ExrImage& image);
-Status read_attributes(const std::string& text, ExrImage& image);
 
 }  // namespace shoal

@@ -3,10 +3,6 @@
 #include <cmath>
 #include <new>
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include "engine/adaptive_sampling.h"
 #include "engine/aov_film.h"
 #include "engine/checkpoint.h"
@@ -14,25 +10,12 @@
 #include "engine/preview.h"
 #include "engine/ray_list.h"
 #include "engine/ray_recorder.h"
-#include "engine/touch_recorder.h"
 #include "engine/render_record.h"
-
-#if defined(__SANITIZE_THREAD__)
-#include <sanitizer/tsan_interface.h>
-#endif
+#include "engine/run_on_threads.h"
+#include "engine/touch_recorder.h"
 
 namespace shoal {
 namespace {
-
-// The thread sanitizer does not see into oneTBB: it is told that what comes before `place` on one thread comes before
-// what comes after it on another.
-#if defined(__SANITIZE_THREAD__)
-void tell_sanitizer_before(const void* place) { __tsan_release(const_cast<void*>(place)); }
-void tell_sanitizer_after(const void* place) { __tsan_acquire(const_cast<void*>(place)); }
-#else
-void tell_sanitizer_before(const void* /*place*/) {}
-void tell_sanitizer_after(const void* /*place*/) {}
-#endif
 
 /// The length of a ray that enters no box.
 constexpr float kRayNowhere = -1;
@@ -60,19 +43,6 @@ void RenderContext::end_pass() {
   again.clear();
   again_first = 0;
   forecast.mark(samples_before, now_seconds() - start_seconds);
-}
-
-void run_on_threads(unsigned threads, const std::function<void(unsigned)>& work) {
-  tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-  tbb::task_arena arena(static_cast<int>(threads));
-  const auto told = [&](unsigned thread) {
-    tell_sanitizer_after(&work);
-    work(thread);
-    tell_sanitizer_before(&work);
-  };
-  tell_sanitizer_before(&work);
-  arena.execute([&] { tbb::parallel_for(0u, threads, told, tbb::simple_partitioner()); });
-  tell_sanitizer_after(&work);
 }
 
 void run_on_threads(RenderContext& context, const std::function<void(unsigned)>& work) {

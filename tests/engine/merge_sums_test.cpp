@@ -2,7 +2,11 @@
 // render; what is not the whole of one picture is refused.
 #include "engine/merge_sums.h"
 
+#include <sys/resource.h>
+
+#include "engine/picture_attributes.h"
 #include "engine/render_report.h"
+#include "engine/sums_file.h"
 #include "tests/engine/stopped_render.h"
 
 namespace shoal::testing {
@@ -140,6 +144,31 @@ TEST(SampleRange, RangesThatCannotBeAreRefused) {
   EXPECT_TRUE(check_picture(picture).ok());
   picture.noise = parse_noise_target("2%").value();
   EXPECT_EQ(check_picture(picture).error().code, ErrorCode::kUsage);
+}
+
+TEST_F(MergeSums, ThereCanBeMorePartsThanFilesOpenAtOnce) {
+  constexpr uint32_t kParts = 200;
+  std::vector<std::string> parts;
+  for (uint32_t i = 0; i < kParts; ++i) {
+    Film film(2, 1);
+    film.add(1, Vec3(static_cast<float>(i)), true);
+    SumsHeader header;
+    header.kind = SumsKind::kPart;
+    header.samples = kParts, header.range = {i, i + 1};
+    parts.push_back(folder_ / ("part" + std::to_string(i)));
+    const Status written =
+        write_sums(posix_file_system(), parts.back(), header, "scene\n", attributes_text({}), {film}, nullptr);
+    ASSERT_TRUE(written.ok()) << written.error().message;
+  }
+  rlimit usual{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &usual), 0);
+  const rlimit few{kParts / 2, usual.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
+  const auto merged = merge_parts(posix_file_system(), parts);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &usual), 0);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  EXPECT_EQ(merged.value().samples, kParts);
+  EXPECT_EQ(merged.value().image.channels.front().values[1], (kParts - 1) / 2.0f);
 }
 
 }  // namespace

@@ -8,9 +8,12 @@
 #include <random>
 
 #include "engine/build_scene.h"
+#include "engine/picture_attributes.h"
 #include "engine/scene.h"
+#include "engine/sums_file.h"
 #include "io/image.h"
 #include "tests/fuzz/shoal_input.h"
+#include "tests/fuzz/sums_input.h"
 #include "tests/io/gltf_scene.h"
 #include "tests/io/image_samples.h"
 #include "tests/support/packed_meshes.h"
@@ -301,6 +304,65 @@ void write_shoals(const SeedFolder& folder) {
   put("moving", moves, moving, false);
 }
 
+// ---- sums of pictures
+
+class SomeUnfinished final : public UnfinishedPaths {
+ public:
+  void each_unfinished(const VisitUnfinished& visit) const override { visit({1, 17, 0}), visit({5, 16, 1}); }
+};
+
+/// As they are, and to be repaired.
+void put_sums(const SeedFolder& folder, const std::string& name, SumsKind kind, uint32_t aovs, bool adaptive) {
+  constexpr uint32_t kWidth = 19, kHeight = 3;
+  Film film(kWidth, kHeight, adaptive ? 2 : 1);
+  AovFilm layers({aovs}, kWidth, kHeight);
+  AdaptiveSampling judged(kWidth, kHeight, {0.1f, 0.3f}, 1);
+  for (uint32_t pixel = 0; pixel < kWidth * kHeight; ++pixel) {
+    for (uint32_t sample = 0; sample < 16; ++sample) {
+      const Vec3 radiance(static_cast<float>(sample % (pixel + 1)), 0.5f, 0.25f);
+      film.add(pixel, radiance, pixel % 4 != 0, adaptive ? AdaptiveSampling::half_of(sample) : 0);
+      if (adaptive) judged.add(pixel, sample, radiance, pixel % 4 != 0);
+    }
+  }
+  if (adaptive) judged.end_pass(film, 16);
+  SumsHeader header;
+  header.kind = kind;
+  header.samples = 64, header.range = {0, 64}, header.next_sample = 7, header.seconds = 1;
+  header.pass.span = {16, 32}, header.pass.passes_count = 2;
+  ExrImage image;
+  image.text["software"] = "shoal", image.numbers["samplesPerPixel"] = 64, image.matrices["worldToCamera"] = {1};
+  const bool part = kind == SumsKind::kPart;
+  const SomeUnfinished unfinished;
+  MemoryFileSystem fs;
+  const Status written = write_sums(fs, "a", header, "scene 1\nsampler sobol\n", part ? attributes_text(image) : "",
+                                    {film, aovs != 0 ? &layers : nullptr, adaptive ? &judged : nullptr},
+                                    part ? nullptr : &unfinished);
+  if (!written.ok()) stop(written.error().message);
+  Bytes file = fs.contents("a");
+  folder.put(name, file);
+  file.insert(file.begin(), std::byte{'R'});
+  if (sums_file_of(file) != fs.contents("a")) stop("repairing sums changes them");
+  folder.put(name + ".repaired", file);
+}
+
+void write_all_sums(const SeedFolder& folder) {
+  put_sums(folder, "checkpoint", SumsKind::kCheckpoint, 0, false);
+  put_sums(folder, "layers", SumsKind::kCheckpoint, (1u << kAovCount) - 1, false);
+  put_sums(folder, "adaptive", SumsKind::kCheckpoint, 0, true);
+  put_sums(folder, "part", SumsKind::kPart, 3, false);
+}
+
+// ---- shoal.json
+
+void write_options(const SeedFolder& folder) {
+  const auto put = [&](const std::string& name, const std::string& text) {
+    const auto bytes = std::as_bytes(std::span(text));
+    folder.put(name, {bytes.begin(), bytes.end()});
+  };
+  put("defaults.json", R"({"defaults": {"spp": 16, "environment": "sky.hdr", "camera": [0.5, -1e9, "x"]}})");
+  put("scenes.json", R"({"defaults": {}, "scenes": {"a.gltf": {"no-denoise": true}, "%41\u00e9.glb": {"spp": "2"}}})");
+}
+
 }  // namespace
 }  // namespace shoal::fuzz
 
@@ -311,5 +373,7 @@ int main(int argc, char** argv) {
   shoal::fuzz::write_exrs({root, "exr"});
   shoal::fuzz::write_gltfs({root, "gltf"});
   shoal::fuzz::write_shoals({root, "shoal"});
+  shoal::fuzz::write_all_sums({root, "sums"});
+  shoal::fuzz::write_options({root, "options"});
   return 0;
 }
