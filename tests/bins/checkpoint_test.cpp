@@ -47,6 +47,19 @@ class CheckpointProgram : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST_F(CheckpointProgram, ARenderThatASignalStopsLeavesItsTraceWhole) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    const std::string trace = folder_ / "trace.json";
+    expect_exit(stopped(join(render({}, kMany), {"--trace", trace, "--threads", "2"}), signal, 30), 9);
+    const auto json = nlohmann::json::parse(file_text(trace), nullptr, false);
+    ASSERT_TRUE(json.is_object());
+    EXPECT_GT(json["traceEvents"].size(), 10u);
+    EXPECT_EQ(json["traceEvents"].back()["name"], "process_name") << "what is written last";
+    stdfs::remove(trace);
+  }
+  EXPECT_FALSE(there("out.exr"));
+}
+
 TEST_F(CheckpointProgram, SignalsLeaveACheckpointAndResumeEndsInTheSameBits) {
   expect_exit(run_shoal(folder_, join(render({}, "48", "whole.exr"), {"--quiet"})), 0);
   const std::vector<std::vector<std::string>> ways = {{"--order", "depth-first"},
