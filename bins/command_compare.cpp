@@ -35,6 +35,7 @@ Status write_text(const std::string& path, const std::string& text) {
 Status write_report(const CompareArguments& arguments, const Comparison& comparison) {
   nlohmann::ordered_json json;
   json["schema_version"] = 1;
+  json["scene_asked"] = arguments.render.scene;
   json["pictures_identical"] = comparison.identical;
   json["runs_count"] = arguments.runs;
   for (const OrderResult& order : comparison.orders) {

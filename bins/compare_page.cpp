@@ -255,8 +255,7 @@ ReportSection machine_section(const Json& json) {
 
 ReportPage compare_page(const std::string& text, const std::vector<ComparedPicture>& pictures) {
   const Json json = Json::parse(text);
-  std::string scene;
-  if (!json["orders"].empty()) scene = json["orders"].front()["scene"].value("file", "");
+  std::string scene = json.value("scene_asked", "");  // not its .shoal, whose name may be a hash
   scene = scene.substr(scene.rfind('/') + 1);
   ReportPage page{"Orders compared: " + scene, json.value("program", "") + ", shoal compare, " + json.value("date", ""), {}, text};
   const auto add = [&](ReportSection section) {

@@ -18,13 +18,17 @@ constexpr uint64_t kMaxThumbnailBytes = 1u << 20;
 constexpr std::string_view kHead = R"(<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Shoal batch</title><style>
-:root { color-scheme: light dark; --ink: #1b2429; --dim: #5b6a72; --ground: #fbfcfc; --line: #d8e0e3; --head: #eef3f4;
+/* The colours of reports (bins/report/theme.css). */
+:root { color-scheme: light dark; --ink: #1c2126; --dim: #5c6670; --ground: #ffffff; --line: #d9dee3; --head: #f4f6f8;
   --good: #1c7c4a; --bad: #b3261e; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e3eaed; --dim: #93a3ab; --ground: #12181b; --line: #2d383d;
-  --head: #1b2429; --good: #5fcf94; --bad: #ff8a80; } }
-body { margin: 2rem; background: var(--ground); color: var(--ink); font: 15px/1.45 system-ui, sans-serif; }
-h1 { font-size: 1.3rem; margin: 0 0 .3rem; } p { margin: .2rem 0; color: var(--dim); } p.bad { color: var(--bad); }
-.wide { overflow-x: auto; margin-top: 1rem; } table { border-collapse: collapse; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e3e8ec; --dim: #98a4ae; --ground: #14181c; --line: #323b43;
+  --head: #1c2228; --good: #5fcf94; --bad: #ff8a80; } }
+@media print { :root { --ink: #000000; --dim: #444444; --ground: #ffffff; --line: #bbbbbb; --good: #1c7c4a; --bad: #b3261e; }
+  html { font-size: 9px; } body { margin: 0; } tr { break-inside: avoid; } th { position: static; } }
+body { margin: 2rem; background: var(--ground); color: var(--ink);
+  font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
+h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; } p { margin: .2rem 0; color: var(--dim); } p.bad { color: var(--bad); }
+.wide { overflow-x: auto; margin-top: 1rem; } table { border-collapse: collapse; font-size: .85rem; }
 th, td { padding: .35rem .7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
 th { background: var(--head); cursor: pointer; white-space: nowrap; position: sticky; top: 0; }
 td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; } th.n { text-align: right; }

@@ -163,6 +163,11 @@ TEST_F(ComparePage, TracesOfAllOrdersAreThereAndWhole) {
   }
 }
 
+TEST_F(ComparePage, IsNamedForTheSceneThatWasAsked) {
+  EXPECT_THAT(html_, HasSubstr("<h1>Orders compared: terrain.gltf</h1>"));
+  EXPECT_EQ(json_["scene_asked"], *folder_ / "terrain/terrain.gltf");
+}
+
 TEST_F(ComparePage, NeedsNothingFromOutside) {
   for (const std::string& source : all_matches(html_, "\\s(?:src|href)=\"([^\"]{0,40})")) {
     EXPECT_TRUE(source.starts_with("data:image/png;base64,")) << source;
