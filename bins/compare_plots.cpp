@@ -1,5 +1,6 @@
 // The sections of the page of `shoal compare` that have plots: traffic, what happens over time, phases, treelets.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
@@ -60,6 +61,13 @@ uint64_t most_of(const Json& json, const char* column) {
     for (const Json& value : order["treelet_heat"][column]) most = std::max(most, value.get<uint64_t>());
   }
   return most;
+}
+
+/// Whether the order only counts the crossings of all treelets together.
+bool is_untold(const Json& order, const std::string& column) {
+  const Json& cells = order["treelet_heat"][column];
+  return column == "visits_count" && order["counters"]["totals"].value("treelet_visits_count", uint64_t{0}) > 0 &&
+         std::all_of(cells.begin(), cells.end(), [](const Json& cell) { return cell == 0; });
 }
 
 }  // namespace
@@ -182,10 +190,15 @@ ReportSection heat_section(const std::string& text) {
   for (const Measure& measure : {Measure{"loads_count", "read from disk", "reads"},
                                  Measure{"visits_count", "crossed by rays", "visits"}}) {
     ReportHeatMaps block;
+    std::vector<std::string> untold;
     const uint64_t end = most_of(json, measure.column);
     for (const auto& [label, order] : json["orders"].items()) {
       if (!order.contains("treelet_heat")) continue;
       const Json& heat = order["treelet_heat"];
+      if (is_untold(order, measure.column)) {
+        untold.push_back(label);
+        continue;
+      }
       block.maps.push_back({label + ": " + measure.title, measure.unit, heat["treelets_count"], heat["treelets_a_cell"],
                             heat[measure.column], end});
     }
@@ -195,6 +208,9 @@ ReportSection heat_section(const std::string& text) {
                                 "of table heads: never.",
                                 measure.title, block.maps[0].items_a_cell == 1 ? std::string("a treelet")
                                                                 : fmt::format("{} treelets", block.maps[0].items_a_cell));
+    if (!untold.empty()) {
+      block.caption += fmt::format(" Not counted by treelet in {}, where whole trees are crossed at once.", fmt::join(untold, ", "));
+    }
     section.blocks.emplace_back(std::move(block));
   }
   return section;

@@ -124,6 +124,18 @@ TEST_F(ComparePage, HeatMapsHaveTheCellsOfTheDocument) {
   }
 }
 
+TEST_F(ComparePage, SaysWhichOrdersDoNotCountCrossingsByTreelet) {
+  json document = json_;
+  for (json& cell : document["orders"]["sorted"]["treelet_heat"]["visits_count"]) cell = 0;
+  const auto made = report_html(compare_page(document.dump(), {}));
+  ASSERT_TRUE(made.ok());
+  const std::string& html = made.value();
+  EXPECT_THAT(html, HasSubstr("Not counted by treelet in sorted"));
+  EXPECT_THAT(html, HasSubstr("depth-first: crossed by rays"));
+  EXPECT_THAT(html, Not(HasSubstr("sorted: crossed by rays")));
+  EXPECT_THAT(html_, Not(HasSubstr("Not counted by treelet")));
+}
+
 TEST_F(ComparePage, EveryFigureIsInTheCsv) {
   std::map<std::string, std::string> figures;
   std::istringstream lines(file_text(*folder_ / "out/compare.csv"));
