@@ -1,10 +1,10 @@
 // bench/check_cache_model: the model of the caches against cachegrind. The same rays through a small terrain in
-// memory, by the kernels and the group of rays of depth-first: under `valgrind --tool=cachegrind` with two levels,
+// memory, by the kernels of an order: under `valgrind --tool=cachegrind` with two levels,
 // and told to the model of the same two levels. Exit code 1 where the misses of either level differ by more than
 // --tolerance, 77 where there is no valgrind. docs/measuring.md "Traffic at each level".
 //
-//   bench/check_cache_model [--triangles N] [--rays N] [--workload W] [--d1 48K:12] [--ll 256K:16]
-//       [--tolerance 0.05] [--folder DIR] [--json F]
+//   bench/check_cache_model [--triangles N] [--rays N] [--workload W] [--order depth-first] [--d1 48K:12]
+//       [--ll 256K:16] [--tolerance 0.05] [--folder DIR] [--json F]
 //
 // The program starts itself under valgrind: once with --model-into, which leaves what the model says of a pass, and
 // for two numbers of passes with --passes, whose difference is what cachegrind says of one. Both under valgrind, so
@@ -23,6 +23,7 @@
 #include "bench/ray_workloads.h"
 #include "engine/cache_levels.h"
 #include "engine/touch_recorder.h"
+#include "treelets/scene_traversal.h"
 
 namespace {
 
@@ -36,7 +37,7 @@ constexpr uint32_t kFewPasses = 1, kManyPasses = 3;
 struct Arguments {
   GivenScene scene{.path = "", .triangles = 20'000};
   uint64_t rays = 10'000;
-  std::string workload = "scene-random", d1 = "48K:12", ll = "256K:16", json;
+  std::string workload = "scene-random", order = "depth-first", d1 = "48K:12", ll = "256K:16", json;
   std::string folder = fs::temp_directory_path().string();
   double tolerance = 0.05;
   bool scalar = false;
@@ -49,13 +50,20 @@ struct Misses {
   double d1 = 0, ll = 0;
 };
 
-/// Depth-first over rays that are given: as engine/render_depth_first sends them, without paths and shading.
+/// One way of tracing all rays that are given, again and again.
 class Passes {
  public:
-  Passes(const MemoryScene& scene, const RaySet& set, TouchLog* touches)
-      : scene_(scene), set_(set), answers_(set.rays.size()), touches_(touches) {}
+  virtual ~Passes() = default;
+  virtual void run() = 0;
+};
 
-  void run() {
+/// As engine/render_depth_first sends them, without paths and shading.
+class DepthFirstPasses final : public Passes {
+ public:
+  DepthFirstPasses(const MemoryScene& scene, const RaySet& set, InnerLoop loop, TouchLog* touches)
+      : scene_(scene), set_(set), answers_(set.rays.size()), loop_(loop), touches_(touches) {}
+
+  void run() override {
     const auto decide = [&](uint32_t, const GroupRay& member, TreeletId treelet) -> const std::byte* {
       if (treelet == kNoIndex) {
         RayAnswer& answer = answers_[member.ray.path & ~Ray::kAnyHitBit];
@@ -74,7 +82,7 @@ class Passes {
       if (group_.size() == 0) return;
       group_.address(scene_.top_tree(), touches_);
       group_.send(scene_.top_tree(), decide);
-      group_.trace(scene_.top_tree(), counters_, TriangleTest::kWatertight, InnerLoop::kMoreNumerous, touches_);
+      group_.trace(scene_.top_tree(), counters_, TriangleTest::kWatertight, loop_, touches_);
     }
   }
 
@@ -82,10 +90,85 @@ class Passes {
   const MemoryScene& scene_;
   const RaySet& set_;
   LargeVector<RayAnswer> answers_;
+  InnerLoop loop_;
   TouchLog* touches_;
   RayGroup group_;
   TraceCounters counters_;
 };
+
+/// As engine/path_stream does: from their start to their end.
+class StreamedPasses final : public Passes, private RayStream {
+ public:
+  StreamedPasses(const MemoryScene& scene, const RaySet& set, const std::string& order, TouchLog* touches)
+      : set_(set),
+        answers_(set.rays.size()),
+        pages_(scene.pages.size()),
+        rays_(kSlots),
+        free_(kSlots),
+        touches_(touches) {
+    for (size_t i = 0; i < pages_.size(); ++i) pages_[i] = scene.pages[i].data();
+    for (uint32_t slot = 0; slot < kSlots; ++slot) free_[slot] = slot;
+    const TopTree& tree = scene.top_tree();
+    constexpr auto kTest = TriangleTest::kWatertight;
+    constexpr uint32_t kPacketRays = 64;
+    if (order == "packet") traversal_ = make_packet_traversal(tree, pages_.data(), kTest, kPacketRays, touches);
+    if (order == "packet-reorder")
+      traversal_ = make_reordering_traversal(tree, pages_.data(), kTest, kPacketRays, touches);
+    if (order == "stream") traversal_ = make_stream_traversal(tree, pages_.data(), kTest, touches);
+    if (!traversal_) tracer_.emplace(tree, pages_.data(), RayGrouping::kAuto);
+  }
+
+  void run() override {
+    next_ = 0;
+    traversal_ ? traversal_->trace(*this, counters_) : tracer_->trace(*this, counters_, touches_);
+  }
+
+ private:
+  static constexpr uint32_t kSlots = 4096;
+
+  Ray* next() override {
+    if (next_ == set_.rays.size() || free_.empty()) return nullptr;
+    Ray& ray = rays_[free_.back()];
+    if (touches_ != nullptr) {
+      touches_->read(set_.rays[next_], TouchKind::kGivenRays);
+      touches_->read(free_.back(), TouchKind::kInHand);
+      touches_->write(ray, TouchKind::kInHand);
+    }
+    free_.pop_back();
+    ray = begin_ray(set_.rays[next_], next_, set_.any_hit);
+    ++next_;
+    return &ray;
+  }
+  void done(Ray& ray, const RayWork&) override {
+    RayAnswer& answer = answers_[ray.path & ~Ray::kAnyHitBit];
+    answer = answer_of(ray);
+    free_.push_back(static_cast<uint32_t>(&ray - rays_.data()));
+    if (touches_ == nullptr) return;
+    touches_->write(answer, TouchKind::kAnswers);
+    touches_->write(free_.back(), TouchKind::kInHand);
+  }
+  const std::byte* bring(TreeletId) override { return nullptr; }
+
+  const RaySet& set_;
+  LargeVector<RayAnswer> answers_;
+  std::vector<const std::byte*> pages_;
+  std::vector<Ray> rays_;
+  std::vector<uint32_t> free_;
+  TouchLog* touches_;
+  std::unique_ptr<SceneTraversal> traversal_;
+  std::optional<SceneTracer> tracer_;
+  TraceCounters counters_;
+  uint32_t next_ = 0;
+};
+
+std::unique_ptr<Passes> make_passes(const std::string& order, const MemoryScene& scene, const RaySet& set,
+                                    TouchLog* touches) {
+  if (!order.starts_with("depth-first")) return std::make_unique<StreamedPasses>(scene, set, order, touches);
+  const InnerLoop loop = order == "depth-first-while-while" ? InnerLoop::kWhileWhile
+                         : order == "depth-first-if-if"     ? InnerLoop::kIfIf
+                                                            : InnerLoop::kMoreNumerous;
+  return std::make_unique<DepthFirstPasses>(scene, set, loop, touches);
+}
 
 Result<CacheShape> one_level(const std::string& text) {
   SHOAL_ASSIGN_OR_RETURN(const std::vector<CacheShape> shapes, parse_cache_levels(text));
@@ -99,7 +182,7 @@ Status trace(const Arguments& arguments) {
   SHOAL_ASSIGN_OR_RETURN(const WorldMesh mesh, take_mesh(scene));
   SHOAL_ASSIGN_OR_RETURN(const RaySet set, RayWorkloads(scene, mesh, arguments.rays, 1).make(arguments.workload));
   if (arguments.model_into.empty()) {
-    const auto passes = std::make_unique<Passes>(scene, set, nullptr);
+    const auto passes = make_passes(arguments.order, scene, set, nullptr);
     for (uint32_t i = 0; i < arguments.passes; ++i) passes->run();
     return {};
   }
@@ -108,7 +191,7 @@ Status trace(const Arguments& arguments) {
   SHOAL_ASSIGN_OR_RETURN(const CacheShape ll, one_level(arguments.ll));
   options.levels = {d1, ll};
   TouchRecorder recorder(options, false);  // cachegrind knows no prefetches
-  const auto passes = std::make_unique<Passes>(scene, set, &recorder.log(0));
+  const auto passes = make_passes(arguments.order, scene, set, &recorder.log(0));
   std::vector<LevelCounts> before;
   for (uint32_t i = 0; i < kManyPasses; ++i) {
     passes->run();
@@ -129,10 +212,10 @@ std::string quoted(const std::string& word) { return "'" + word + "'"; }
 /// This program again under a tool of valgrind. Fails with: kInternal (it failed).
 Status run_under(const std::string& tool, const Arguments& arguments, const std::string& scene,
                  const std::string& more) {
-  std::string command =
-      fmt::format("valgrind -q {} {} --scene {} --rays {} --workload {} --d1 {} --ll {} {} {}", tool,
-                  quoted(fs::read_symlink("/proc/self/exe").string()), quoted(scene), arguments.rays,
-                  arguments.workload, arguments.d1, arguments.ll, arguments.scalar ? "--scalar" : "", more);
+  std::string command = fmt::format(
+      "valgrind -q {} {} --scene {} --rays {} --workload {} --order {} --d1 {} --ll {} {} {}", tool,
+      quoted(fs::read_symlink("/proc/self/exe").string()), quoted(scene), arguments.rays, arguments.workload,
+      arguments.order, arguments.d1, arguments.ll, arguments.scalar ? "--scalar" : "", more);
   const int status = std::system(command.c_str());
   if (status == 0) return {};
   return Error{ErrorCode::kInternal, fmt::format("status {} of {}", status, command)};
@@ -200,8 +283,9 @@ Status check(const Arguments& arguments) {
     double model, grind;
     double apart() const { return model / grind - 1; }
   } rows[] = {{"D1", model.d1, grind.d1}, {"LL", model.ll, grind.ll}};
-  fmt::print("{} rays of {}, D1 {}, LL {}, {} kernels; misses of one pass\n", arguments.rays, arguments.workload,
-             arguments.d1, arguments.ll, arguments.scalar ? "scalar" : "vector");
+  fmt::print("{} rays of {}, {}, D1 {}, LL {}, {} kernels; misses of one pass\n", arguments.rays,
+             arguments.workload, arguments.order, arguments.d1, arguments.ll,
+             arguments.scalar ? "scalar" : "vector");
   nlohmann::ordered_json json;
   bool near = true;
   for (const auto& row : rows) {
@@ -226,6 +310,10 @@ int main(int argc, char** argv) {
   app.add_option("--triangles", arguments.scene.triangles, "of the terrain")->capture_default_str();
   app.add_option("--rays", arguments.rays, "of a pass")->capture_default_str();
   app.add_option("--workload", arguments.workload, "as of against_embree")->capture_default_str();
+  app.add_option("--order", arguments.order, "of one thread, in memory")
+      ->check(CLI::IsMember({"depth-first", "depth-first-while-while", "depth-first-if-if", "hybrid", "packet",
+                             "packet-reorder", "stream"}))
+      ->capture_default_str();
   app.add_option("--d1", arguments.d1, "SIZE:WAYS of the first level")->capture_default_str();
   app.add_option("--ll", arguments.ll, "SIZE:WAYS of the last level")->capture_default_str();
   app.add_option("--tolerance", arguments.tolerance, "share that misses may differ by")->capture_default_str();

@@ -17,12 +17,6 @@ constexpr const char* kModelHelp =
 constexpr uint64_t kRaysForAllSets = 4'000'000;
 constexpr uint32_t kSetsOfManyRays = 16;
 
-/// Orders whose kernels can tell what they touch; auto chooses among them.
-bool tells_touches(Order order) {
-  return order == Order::kAuto || order == Order::kQueued || order == Order::kDepthFirst ||
-         order == Order::kSorted || order == Order::kHybrid;
-}
-
 /// Why this render cannot be modelled; empty: it can.
 std::string why_not(const LevelArguments& arguments, const PreparedRender& prepared,
                     const ExecutionOptions& execution) {
@@ -30,7 +24,6 @@ std::string why_not(const LevelArguments& arguments, const PreparedRender& prepa
   if (prepared.picture.shading.triangle_test != TriangleTest::kWatertight) {
     return "only kernels of --triangle-test watertight tell what they touch";
   }
-  if (!tells_touches(execution.order)) return "kernels of this order do not tell what they touch";
   if (execution.time_limit_seconds > 0) return "with a time limit a slower run is another picture";
   return "";
 }

@@ -13,7 +13,7 @@
 
 namespace shoal {
 
-/// The last: what tells what is touched, or none; kernels that cannot tell leave it alone.
+/// The last: is told what is touched, or none.
 using MakeTraversal =
     std::function<std::unique_ptr<SceneTraversal>(const TopTree&, PageTable, TriangleTest, TouchLog*)>;
 

@@ -55,7 +55,7 @@ uint32_t RayGroup::trace(const TopTree& tree, TraceCounters& counters, TriangleT
     trace_treelets({jobs, size_}, counters, test, loop);
   } else {
     touches->write(jobs, size_ * sizeof(TraceJob), TouchKind::kInHand);
-    trace_treelets_touching({jobs, size_}, counters, *touches);
+    trace_treelets_touching({jobs, size_}, counters, *touches, loop);
     for (uint32_t i = 0; i < size_; ++i) touch_member(rays_[slot_[i]], *touches);
   }
   for (uint32_t i = 0; i < size_; ++i) {

@@ -4,9 +4,10 @@
 namespace shoal {
 
 void render_packet(RenderContext& context) {
-  render_streamed(context, Order::kPacket, [&](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog*) {
-    return make_packet_traversal(tree, pages, test, context.packet_rays);
-  });
+  render_streamed(context, Order::kPacket,
+                  [&](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog* touches) {
+                    return make_packet_traversal(tree, pages, test, context.packet_rays, touches);
+                  });
 }
 
 }  // namespace shoal

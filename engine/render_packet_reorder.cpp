@@ -4,9 +4,10 @@
 namespace shoal {
 
 void render_packet_reorder(RenderContext& context) {
-  render_streamed(context, Order::kPacketReorder, [&](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog*) {
-    return make_reordering_traversal(tree, pages, test, context.packet_rays);
-  });
+  render_streamed(context, Order::kPacketReorder,
+                  [&](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog* touches) {
+                    return make_reordering_traversal(tree, pages, test, context.packet_rays, touches);
+                  });
 }
 
 }  // namespace shoal

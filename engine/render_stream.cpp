@@ -4,9 +4,10 @@
 namespace shoal {
 
 void render_stream(RenderContext& context) {
-  render_streamed(context, Order::kStream, [](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog*) {
-    return make_stream_traversal(tree, pages, test);
-  });
+  render_streamed(context, Order::kStream,
+                  [](const TopTree& tree, PageTable pages, TriangleTest test, TouchLog* touches) {
+                    return make_stream_traversal(tree, pages, test, touches);
+                  });
 }
 
 }  // namespace shoal

@@ -9,11 +9,14 @@
 // threads.
 #pragma once
 
+#include "treelets/touch_log.h"
 #include "treelets/trace_treelet.h"
 
 namespace shoal {
 
 /// Requires: kWhileWhile or kIfIf.
 void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop);
+/// The same by TriangleTest::kWatertight, telling what is touched (treelets/trace_touching.h).
+void trace_lock_step_touching(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop, TouchLog& log);
 
 }  // namespace shoal

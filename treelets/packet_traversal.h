@@ -7,12 +7,13 @@
 namespace shoal {
 
 using WalkPackets = void (*)(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays,
-                             RayStream& stream, TraceCounters& counters);
+                             RayStream& stream, TraceCounters& counters, TouchLog* touches);
 
 class PacketTraversal final : public SceneTraversal {
  public:
   /// Requires: make_packet_traversal()'s.
-  PacketTraversal(const TopTree& tree, PageTable pages, TriangleTest test, uint32_t packet_rays, WalkPackets walk);
+  PacketTraversal(const TopTree& tree, PageTable pages, TriangleTest test, uint32_t packet_rays, WalkPackets walk,
+                  TouchLog* touches);
   void trace(RayStream& stream, TraceCounters& counters) override;
 
  private:
@@ -21,6 +22,7 @@ class PacketTraversal final : public SceneTraversal {
   TriangleTest test_;
   uint32_t packet_rays_;
   WalkPackets walk_;
+  TouchLog* touches_;
   std::unique_ptr<PacketWalkState> state_;
 };
 

@@ -22,16 +22,19 @@
 #include "treelets/leaf_kernel-inl.h"
 #include "treelets/packet_frames-inl.h"
 #include "treelets/space_kernel-inl.h"
+#include "treelets/touch_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace shoal {
 namespace HWY_NAMESPACE {
 
-template <TriangleTest kTest, class Policy>
+/// `Meter`: NoTouches, or TouchMeter to tell what is touched (treelets/touch_log.h).
+template <TriangleTest kTest, class Policy, class Meter = NoTouches>
 class PacketWalk : private PacketFrames {
  public:
-  PacketWalk(const SceneTables& tables, PacketWalkState& state, RayStream& stream, TraceCounters& counters)
-      : PacketFrames(state), tables_(tables), stream_(stream), counters_(counters) {}
+  PacketWalk(const SceneTables& tables, PacketWalkState& state, RayStream& stream, TraceCounters& counters,
+             Meter meter = {})
+      : PacketFrames(state), tables_(tables), stream_(stream), counters_(counters), meter_(meter) {}
 
   /// Packets of `size` rays until the stream has no more and none wait.
   HWY_INLINE void run(uint32_t size) {
@@ -39,6 +42,7 @@ class PacketWalk : private PacketFrames {
     while (const uint32_t count = take(size)) {
       walk(count);
       for (uint32_t i = 0; i < count; ++i) {
+        touch_ray_and_work(i);
         s_.rays[i]->instance = kNoIndex;
         s_.work[i].node_tests += (s_.box_tests[i] + 7) / 8;
         stream_.done(*s_.rays[i], s_.work[i]);
@@ -60,6 +64,8 @@ class PacketWalk : private PacketFrames {
     if (s_.waiting_count[kind] != size) kind = s_.waiting_count[0] >= s_.waiting_count[1] ? 0 : 1;
     const uint32_t count = s_.waiting_count[kind];
     std::copy_n(s_.waiting[kind], count, s_.rays);
+    touch_read(meter_, s_.waiting[kind], count * sizeof(Ray*), TouchKind::kInHand);
+    touch_write(meter_, s_.rays, count * sizeof(Ray*), TouchKind::kInHand);
     s_.waiting_count[kind] = 0;
     return count;
   }
@@ -70,10 +76,12 @@ class PacketWalk : private PacketFrames {
     Frame& frame = open_frame();
     for (uint32_t i = 0; i < count; ++i) {
       Ray& ray = *s_.rays[i];
+      touch_ray_and_work(i);
       s_.work[i] = {}, s_.box_tests[i] = 0, s_.gone[i] = false;
       RayContext context;
       if (identity) {
         ray.instance = 0;
+        touch_write(meter_, &s_.space[i], sizeof(RaySpace), TouchKind::kInHand);
         prepare_identity(ray, tables_.instances[0].max_abs_coordinate, s_.space[i]);
       }
       const RaySpace& space = identity ? s_.space[i] : tables_.tree->world_space(ray, context);
@@ -92,12 +100,21 @@ class PacketWalk : private PacketFrames {
     }
   }
 
+  /// Of a packet that begins or ends.
+  HWY_INLINE void touch_ray_and_work(uint32_t ray) {
+    touch_write(meter_, s_.rays[ray], sizeof(Ray), TouchKind::kInHand);
+    touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
+    touch_write(meter_, &s_.box_tests[ray], sizeof s_.box_tests[ray], TouchKind::kInHand);
+    touch_write(meter_, &s_.gone[ray], sizeof s_.gone[ray], TouchKind::kInHand);
+  }
+
   HWY_INLINE PacketScope& scope() { return s_.scopes[s_.scope_count - 1]; }
   /// One that the kernels cannot take goes to its end at once.
   HWY_INLINE void add_ray(Frame& frame, uint32_t ray, const RaySpace& space, uint32_t outer) {
     if (HWY_UNLIKELY(space.extreme)) return trace_alone(ray);
     const uint32_t lane = add_lane(frame, ray, outer);
     Row& at = row(frame, frame.row_count - 1);
+    touch_write(meter_, &at, sizeof(Row), TouchKind::kInHand);  // a lane has a word of each of its lines
     for (uint32_t axis = 0; axis < 3; ++axis) {
       at.slope[axis][lane] = space.slope[axis];
       at.near_bias[axis][lane] = space.near_bias[axis], at.far_bias[axis][lane] = space.far_bias[axis];
@@ -117,6 +134,8 @@ class PacketWalk : private PacketFrames {
     Frame& frame = open_frame();
     each_masked(*around.frame, rows, [&](uint32_t r, Row& from, uint32_t lane, uint32_t ray) HWY_ATTR {
       const uint32_t to = add_lane(frame, ray, r << 4 | lane);
+      touch_read(meter_, &from, sizeof(Row), TouchKind::kInHand);
+      touch_write(meter_, &row(frame, frame.row_count - 1), sizeof(Row), TouchKind::kInHand);
       copy_lane(from, lane, row(frame, frame.row_count - 1), to);
     });
     close_frame(frame);
@@ -134,6 +153,10 @@ class PacketWalk : private PacketFrames {
     for (uint32_t i = 0; i < inner.ray_count; ++i) {
       const Row& from = row(inner, i / kRowRays);
       const uint32_t lane = i % kRowRays, ray = from.ray[lane];
+      touch_read(meter_, from.ray, sizeof(Row) - offsetof(Row, ray), TouchKind::kInHand);
+      touch_write(meter_, &s_.box_tests[ray], sizeof s_.box_tests[ray], TouchKind::kInHand);
+      if (s_.scope_count > 0)
+        touch_write(meter_, &row(*scope().frame, from.outer[lane] >> 4).t, 64, TouchKind::kInHand);
       s_.box_tests[ray] += from.box_tests;
       if (s_.scope_count > 0) update(*scope().frame, from.outer[lane], ray);
     }
@@ -147,6 +170,7 @@ class PacketWalk : private PacketFrames {
 
   HWY_INLINE void step(const WaitingBox& waiting) {
     const WaitingBox box = waiting;  // what is pushed overwrites it
+    touch_read(meter_, &waiting, sizeof waiting, TouchKind::kInHand);
     const Frame& frame = *scope().frame;
     const bool inner = is_inner(box.ref);
     uint32_t rows = find_rows(frame, box, Policy::kFirstRowSuffices && inner);
@@ -167,10 +191,13 @@ class PacketWalk : private PacketFrames {
       const auto r = static_cast<uint32_t>(std::countr_zero(left));
       Row& at = row(frame, r);
       masks_[r] = enter_box(at, box) & at.alive;
+      touch_read(meter_, &at, offsetof(Row, ray), TouchKind::kInHand);
+      touch_write(meter_, &at.alive, sizeof at.alive + sizeof at.box_tests, TouchKind::kInHand);
       ++at.box_tests;
       counters_.simd_lanes_count += kRowRays;
       if (masks_[r] == 0) continue;
       counters_.simd_active_lanes_count += static_cast<uint32_t>(std::popcount(masks_[r]));
+      touch_lanes(static_cast<uint32_t>(std::popcount(masks_[r])));
       if (first_only) return left;
       found |= 1u << r;
     }
@@ -181,6 +208,7 @@ class PacketWalk : private PacketFrames {
   /// `rows`.
   HWY_INLINE void push_children(const ChildBoxes& boxes, uint32_t rows) {
     const Frame& frame = *scope().frame;
+    touch_read(meter_, &frame, sizeof frame, TouchKind::kInHand);
     const auto first = static_cast<uint32_t>(std::countr_zero(rows));
     float near[8];
     near_of(row(frame, first), static_cast<uint32_t>(std::countr_zero(masks_[first])), boxes, near);
@@ -195,6 +223,7 @@ class PacketWalk : private PacketFrames {
     for (uint32_t i = 0; i < size; ++i) {
       const uint32_t slot = keys[i] & 7;
       WaitingBox& box = s_.stack[s_.size++];
+      touch_write(meter_, &box, sizeof box, TouchKind::kInHand);
       for (uint32_t axis = 0; axis < 3; ++axis)
         box.lo[axis] = boxes.lo[axis][slot], box.hi[axis] = boxes.hi[axis][slot];
       box.ref = boxes.refs[slot];
@@ -203,9 +232,13 @@ class PacketWalk : private PacketFrames {
   }
 
   HWY_INLINE void cross_top(uint32_t index, uint32_t rows) {
+    touch_read(meter_, &tables_.nodes[index], sizeof(TopNode), TouchKind::kTopTree);
     push_children(ChildBoxes(tables_.nodes[index]), rows);
   }
-  HWY_INLINE void cross_node(NodeRef ref, uint32_t rows) { push_children(ChildBoxes(scope().nodes[ref]), rows); }
+  HWY_INLINE void cross_node(NodeRef ref, uint32_t rows) {
+    touch_read(meter_, &scope().nodes[ref], sizeof(QuantizedNode), TouchKind::kNodes);
+    push_children(ChildBoxes(scope().nodes[ref]), rows);
+  }
 
   /// What is on top of the stack comes next.
   HWY_INLINE void prefetch_next() {
@@ -219,6 +252,10 @@ class PacketWalk : private PacketFrames {
       at = is_leaf(ref) ? scope().leaves + size_t{4} * leaf_offset(ref)
                         : reinterpret_cast<const std::byte*>(scope().nodes + ref);
     }
+    touch_ahead(meter_, at, 3,
+                !scope().in_treelet ? TouchKind::kTopTree
+                : is_leaf(ref)      ? TouchKind::kLeaves
+                                    : TouchKind::kNodes);
     for (int line = 0; line < 3; ++line) hwy::Prefetch(at + 64 * line);
   }
 
@@ -240,9 +277,14 @@ class PacketWalk : private PacketFrames {
   HWY_NOINLINE void enter_treelet(const TreeletEntry& entry, uint32_t rows) {
     const std::byte* page = page_of(tables_, entry.treelet, stream_);
     if (HWY_UNLIKELY(page == nullptr)) return;
-    each_masked(*scope().frame, rows,
-                [&](uint32_t, Row&, uint32_t, uint32_t ray) HWY_ATTR { ++s_.work[ray].treelets; });
+    each_masked(*scope().frame, rows, [&](uint32_t, Row&, uint32_t, uint32_t ray) HWY_ATTR {
+      touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
+      ++s_.work[ray].treelets;
+    });
     const TreeletView treelet(page);
+    touch_read(meter_, &entry, sizeof entry, TouchKind::kTopTree);
+    touch_read(meter_, &tables_.pages[entry.treelet], sizeof page, TouchKind::kTopTree);
+    touch_read(meter_, &treelet.header->leaves_offset, sizeof(uint32_t), TouchKind::kNodes);
     PacketFrame* frame = scope().frame;
     s_.scopes[s_.scope_count++] = {frame,        s_.size, true, entry, page, page + treelet.header->leaves_offset,
                                    treelet.nodes};
@@ -252,7 +294,10 @@ class PacketWalk : private PacketFrames {
   HWY_NOINLINE void enter_instance(uint32_t instance, uint32_t rows) {
     Frame& frame = open_frame();
     Frame& around = *scope().frame;
+    touch_read(meter_, &tables_.instances[instance], sizeof(Instance), TouchKind::kTopTree);
     each_masked(around, rows, [&](uint32_t r, Row&, uint32_t lane, uint32_t ray) HWY_ATTR {
+      touch_write(meter_, s_.rays[ray], sizeof(Ray), TouchKind::kInHand);
+      touch_write(meter_, &s_.space[ray], sizeof(RaySpace), TouchKind::kInHand);
       s_.rays[ray]->instance = instance;
       s_.space[ray] = to_object_space(*s_.rays[ray], tables_.instances[instance]);
       add_ray(frame, ray, s_.space[ray], r << 4 | lane);
@@ -268,6 +313,10 @@ class PacketWalk : private PacketFrames {
     const LeafView leaf(scope().leaves + size_t{4} * leaf_offset(ref));
     Frame& frame = *scope().frame;
     each_masked(frame, rows, [&](uint32_t r, Row& at, uint32_t lane, uint32_t ray) HWY_ATTR {
+      touch_candidates(meter_, leaf);
+      touch_read(meter_, &s_.space[ray], sizeof(RaySpace), TouchKind::kInHand);
+      touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
+      touch_read(meter_, &s_.rays[ray]->t, sizeof(float), TouchKind::kInHand);
       s_.work[ray].triangle_tests += leaf.triangle_count;
       counters_.simd_lanes_count += kRowRays, counters_.simd_active_lanes_count += leaf.triangle_count;
       const uint32_t candidates = find_candidates<kTest>(s_.space[ray], leaf, s_.rays[ray]->t);
@@ -280,6 +329,11 @@ class PacketWalk : private PacketFrames {
     });
   }
 
+  /// A row has rays that enter a box.
+  HWY_INLINE void touch_lanes(uint32_t entered) {
+    if constexpr (Meter::kMeters) meter_.log->lanes.packets.add(entered, kRowRays);
+  }
+
   /// True when an any-hit ray is done.
   HWY_INLINE bool test_leaf(const LeafView& leaf, uint32_t offset, uint32_t candidates, uint32_t ray) {
     return test_candidates<kTest>(TreeletView(scope().page), leaf, offset, candidates, s_.space[ray], *s_.rays[ray],
@@ -289,6 +343,7 @@ class PacketWalk : private PacketFrames {
   const SceneTables& tables_;
   RayStream& stream_;
   TraceCounters& counters_;
+  [[no_unique_address]] Meter meter_;
 };
 
 }  // namespace HWY_NAMESPACE

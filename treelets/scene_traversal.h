@@ -34,13 +34,15 @@ inline constexpr uint32_t kLeastPacketRays = 16, kMostPacketRays = 256;
 /// Rays of a stream. Fewer fill the lists of lower nodes worse, more leave the core's cache (docs/decisions/0028).
 inline constexpr uint32_t kStreamRays = 2048;
 
-/// Keep references to the tree and the table. Requires: `packet_rays` is a power of two from kLeastPacketRays to
-/// kMostPacketRays.
+/// Keep references to the tree, the table and `touches`, which is told what is touched where somebody measures that by
+/// TriangleTest::kWatertight (treelets/trace_touching.h). Requires: `packet_rays` is a power of two from kLeastPacketRays
+/// to kMostPacketRays.
 std::unique_ptr<SceneTraversal> make_packet_traversal(const TopTree& tree, PageTable pages, TriangleTest test,
-                                                      uint32_t packet_rays);
+                                                      uint32_t packet_rays, TouchLog* touches = nullptr);
 std::unique_ptr<SceneTraversal> make_reordering_traversal(const TopTree& tree, PageTable pages, TriangleTest test,
-                                                          uint32_t packet_rays);
-std::unique_ptr<SceneTraversal> make_stream_traversal(const TopTree& tree, PageTable pages, TriangleTest test);
+                                                          uint32_t packet_rays, TouchLog* touches = nullptr);
+std::unique_ptr<SceneTraversal> make_stream_traversal(const TopTree& tree, PageTable pages, TriangleTest test,
+                                                      TouchLog* touches = nullptr);
 
 /// Of a traversal of either kind of packet, of the largest size; of one by streams.
 uint64_t packet_traversal_bytes();

@@ -12,12 +12,13 @@ HWY_BEFORE_NAMESPACE();
 namespace shoal {
 namespace HWY_NAMESPACE {
 
-template <TriangleTest kTest>
-class LockStep : private Tracer<kTest> {
-  using Tracer<kTest>::kNodes, Tracer<kTest>::kLeaves, Tracer<kTest>::waiting_, Tracer<kTest>::counters_;
+template <TriangleTest kTest, class Meter = NoTouches>
+class LockStep : private Tracer<kTest, Meter> {
+  using Base = Tracer<kTest, Meter>;
+  using Base::kNodes, Base::kLeaves, Base::waiting_, Base::counters_;
 
  public:
-  using Tracer<kTest>::Tracer;
+  using Base::Base;
 
   HWY_INLINE void while_while() {
     for (start(); nodes() + leaves() > 0;) {
@@ -35,7 +36,7 @@ class LockStep : private Tracer<kTest> {
 
  private:
   HWY_INLINE void start() {
-    for (uint32_t lane = 0; lane < kTraceLanes; ++lane) Tracer<kTest>::start(lane);
+    for (uint32_t lane = 0; lane < kTraceLanes; ++lane) Base::start(lane);
   }
   HWY_INLINE uint32_t nodes() const { return waiting_[kNodes].size(); }
   HWY_INLINE uint32_t leaves() const { return waiting_[kLeaves].size(); }
@@ -53,9 +54,10 @@ class LockStep : private Tracer<kTest> {
   }
 };
 
-template <TriangleTest kTest>
-HWY_INLINE void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop) {
-  LockStep<kTest> lanes(jobs, counters);
+template <TriangleTest kTest, class Meter = NoTouches>
+HWY_INLINE void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop,
+                                Meter meter = {}) {
+  LockStep<kTest, Meter> lanes(jobs, counters, meter);
   loop == InnerLoop::kWhileWhile ? lanes.while_while() : lanes.if_if();
 }
 
@@ -68,6 +70,9 @@ void lock_step_fast(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop
 void lock_step_double(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop) {
   trace_lock_step<TriangleTest::kDouble>(jobs, counters, loop);
 }
+void lock_step_touching(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop, TouchLog& log) {
+  trace_lock_step<TriangleTest::kWatertight>(jobs, counters, loop, TouchMeter{&log});
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
@@ -79,6 +84,7 @@ namespace shoal {
 HWY_EXPORT(lock_step_watertight);
 HWY_EXPORT(lock_step_fast);
 HWY_EXPORT(lock_step_double);
+HWY_EXPORT(lock_step_touching);
 
 void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, TriangleTest test, InnerLoop loop) {
   switch (test) {
@@ -89,6 +95,10 @@ void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, Triangle
     case TriangleTest::kWatertight:
       return HWY_DYNAMIC_DISPATCH(lock_step_watertight)(jobs, counters, loop);
   }
+}
+
+void trace_lock_step_touching(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop, TouchLog& log) {
+  HWY_DYNAMIC_DISPATCH(lock_step_touching)(jobs, counters, loop, log);
 }
 
 }  // namespace shoal

@@ -32,6 +32,11 @@ void reordered_packets_double(const SceneTables& tables, PacketWalkState& state,
                               RayStream& stream, TraceCounters& counters) {
   PacketWalk<TriangleTest::kDouble, ReorderedPackets>(tables, state, stream, counters).run(packet_rays);
 }
+void reordered_packets_touching(const SceneTables& tables, PacketWalkState& state, uint32_t packet_rays,
+                                RayStream& stream, TraceCounters& counters, TouchLog& log) {
+  PacketWalk<TriangleTest::kWatertight, ReorderedPackets, TouchMeter>(tables, state, stream, counters, {&log})
+      .run(packet_rays);
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace shoal
@@ -43,21 +48,25 @@ namespace shoal {
 HWY_EXPORT(reordered_packets_watertight);
 HWY_EXPORT(reordered_packets_fast);
 HWY_EXPORT(reordered_packets_double);
+HWY_EXPORT(reordered_packets_touching);
 
 std::unique_ptr<SceneTraversal> make_reordering_traversal(const TopTree& tree, PageTable pages, TriangleTest test,
-                                                          uint32_t packet_rays) {
+                                                          uint32_t packet_rays, TouchLog* touches) {
   const auto walk = [](const SceneTables& tables, PacketWalkState& state, uint32_t rays, RayStream& stream,
-                       TraceCounters& counters) {
+                       TraceCounters& counters, TouchLog* log) {
     switch (tables.test) {
       case TriangleTest::kFast:
         return HWY_DYNAMIC_DISPATCH(reordered_packets_fast)(tables, state, rays, stream, counters);
       case TriangleTest::kDouble:
         return HWY_DYNAMIC_DISPATCH(reordered_packets_double)(tables, state, rays, stream, counters);
       case TriangleTest::kWatertight:
+        if (HWY_UNLIKELY(log != nullptr)) {
+          return HWY_DYNAMIC_DISPATCH(reordered_packets_touching)(tables, state, rays, stream, counters, *log);
+        }
         return HWY_DYNAMIC_DISPATCH(reordered_packets_watertight)(tables, state, rays, stream, counters);
     }
   };
-  return std::make_unique<PacketTraversal>(tree, pages, test, packet_rays, walk);
+  return std::make_unique<PacketTraversal>(tree, pages, test, packet_rays, walk, touches);
 }
 
 }  // namespace shoal

@@ -1,5 +1,5 @@
 // The kernels of tracing, telling a TouchLog every byte that they touch: the very templates behind TopTree::next(),
-// trace_treelets() and SceneTracer, compiled a second time with a meter, for the same instruction sets. So answers and
+// trace_treelets(), SceneTracer and every SceneTraversal, compiled a second time with a meter, for the same instruction sets. So answers and
 // numbers of tests are those of the kernels to the bit. Called by engine/ray_group and benches. One thread a log.
 // Cost: some three times that of the kernel, beside what the log's sink does.
 //
@@ -19,6 +19,7 @@ namespace shoal {
 void next_entries_touching(const TopTree& tree, std::span<NextJob> jobs, TouchLog& log);
 
 /// As trace_treelets() by TriangleTest::kWatertight.
-void trace_treelets_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log);
+void trace_treelets_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log,
+                             InnerLoop loop = InnerLoop::kMoreNumerous);
 
 }  // namespace shoal

@@ -54,8 +54,12 @@ void trace_treelets(std::span<TraceJob> jobs, TraceCounters& counters, TriangleT
   add_tests(jobs, counters);
 }
 
-void trace_treelets_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log) {
-  HWY_DYNAMIC_DISPATCH(trace_touching)(jobs, counters, log);
+void trace_treelets_touching(std::span<TraceJob> jobs, TraceCounters& counters, TouchLog& log, InnerLoop loop) {
+  if (loop != InnerLoop::kMoreNumerous) {
+    trace_lock_step_touching(jobs, counters, loop, log);
+  } else {
+    HWY_DYNAMIC_DISPATCH(trace_touching)(jobs, counters, log);
+  }
   add_tests(jobs, counters);
 }
 

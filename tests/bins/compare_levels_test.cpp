@@ -54,7 +54,7 @@ TEST(CompareLevels, EveryOrderHasTheTrafficOfEachLevel) {
   const TemporaryFolder folder;
   make_terrain(folder);
   const ProgramRun run =
-      compare(folder, {"--orders", "queued,depth-first,sorted,hybrid", "--cache-levels", "16K:4,96K:12,512K:16"});
+      compare(folder, {"--orders", "queued,depth-first,sorted,hybrid,packet,packet-reorder,stream,depth-first-if-if", "--cache-levels", "16K:4,96K:12,512K:16"});
   expect_exit(run, 0);
   for (const char* row :
        {"treelet lines touched a ray", "L1 misses a ray (model)", "last level misses a ray (model)",

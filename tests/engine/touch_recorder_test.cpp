@@ -14,7 +14,9 @@
 namespace shoal {
 namespace {
 
-constexpr Order kOrders[] = {Order::kDepthFirst, Order::kSorted, Order::kQueued, Order::kHybrid};
+constexpr Order kOrders[] = {Order::kDepthFirst, Order::kSorted,        Order::kQueued,
+                             Order::kHybrid,     Order::kPacket,        Order::kPacketReorder,
+                             Order::kStream,     Order::kDepthFirstIfIf};
 
 CacheModel::Options small_caches() {
   return {
@@ -82,7 +84,7 @@ TEST_F(TouchRecorderTest, PicturesAndTestsAreThoseOfARunThatNobodyMeasures) {
 TEST_F(TouchRecorderTest, TellsEveryNodeAndEveryLeafThatIsTested) {
   for (const char* kind : {"terrain", "instances"}) {
     const Scene& scene = this->scene(kind);
-    for (const Order order : {Order::kDepthFirst, Order::kSorted, Order::kQueued}) {
+    for (const Order order : {Order::kDepthFirst, Order::kSorted, Order::kQueued, Order::kStream}) {
       SCOPED_TRACE(std::string(kind) + ", " + std::string(order_name(order)));
       TouchRecorder recorder(small_caches());
       const RayCounters rays = render_with(scene, order, 2, &recorder).counters.total();
@@ -94,6 +96,35 @@ TEST_F(TouchRecorderTest, TellsEveryNodeAndEveryLeafThatIsTested) {
       EXPECT_GT(report.treelet_lines, 2 * report.lanes.nodes.offered / 8);  // and leaves
       EXPECT_EQ(report.lanes.packets.offered, 0u);
     }
+  }
+}
+
+TEST_F(TouchRecorderTest, TellsEveryLeafThatPacketsTest) {
+  for (const char* kind : {"terrain", "instances"}) {
+    const Scene& scene = this->scene(kind);
+    for (const Order order : {Order::kPacket, Order::kPacketReorder}) {
+      SCOPED_TRACE(std::string(kind) + ", " + std::string(order_name(order)));
+      TouchRecorder recorder(small_caches());
+      const RayCounters rays = render_with(scene, order, 2, &recorder).counters.total();
+      const TouchReport report = recorder.report();
+      EXPECT_EQ(report.lanes.leaves.active, rays.triangle_tests_count);
+      EXPECT_GT(report.lanes.packets.active, 0u);
+      EXPECT_LE(report.lanes.packets.share(), 1.0);
+      EXPECT_GT(report.treelet_lines, report.lanes.leaves.offered / 16);
+    }
+  }
+}
+
+TEST_F(TouchRecorderTest, InnerLoopsTouchTheLinesOfTreeletsThatDepthFirstTouches) {
+  const Scene& scene = this->scene("terrain");
+  TouchRecorder plain(small_caches());
+  const RayCounters rays = render_with(scene, Order::kDepthFirst, 1, &plain).counters.total();
+  const uint64_t lines = plain.report().treelet_lines;
+  for (const Order order : {Order::kDepthFirstWhileWhile, Order::kDepthFirstIfIf}) {
+    TouchRecorder recorder(small_caches());
+    EXPECT_EQ(render_with(scene, order, 1, &recorder).counters.total().node_tests_count,
+              rays.node_tests_count);
+    EXPECT_EQ(recorder.report().treelet_lines, lines);
   }
 }
 

@@ -74,7 +74,9 @@ inline constexpr TraversalWay kTraversalWays[] = {
     {"reordered packets of 256", [](const TopTree& tree, PageTable pages, TriangleTest test) {
        return make_reordering_traversal(tree, pages, test, 256);
      }},
-    {"streams", make_stream_traversal},
+    {"streams", [](const TopTree& tree, PageTable pages, TriangleTest test) {
+       return make_stream_traversal(tree, pages, test);
+     }},
 };
 
 /// All of them from start to end: the rays at their ends. Adds to `counters`.
