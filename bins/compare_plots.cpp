@@ -28,8 +28,8 @@ std::vector<std::string> labels_of(const Json& json) {
 }
 
 /// A line an order: a column of its timeline.
-ReportPlot line_plot(const Json& json, const std::string& title, const std::string& label, const char* column, bool bytes,
-                     const std::function<bool(const Json&)>& shown) {
+ReportPlot line_plot(const Json& json, const std::string& title, const std::string& label, const char* column,
+                     bool bytes, const std::function<bool(const Json&)>& shown) {
   ReportPlot plot{title, "seconds", label, false, false, {}};
   plot.y_bytes = bytes;
   plot.half = true;
@@ -126,14 +126,16 @@ ReportSection time_section(const std::string& text) {
   add(line_plot(json, "Traffic: read from disk", "bytes", "disk_read_bytes", true, always));
   add(line_plot(json, "Traffic: how fast", "bytes a second", "disk_read_bytes_per_second", true, always));
   add(line_plot(json, "Queues: rays and paths that wait", "rays", "rays_waiting_count", false, queues));
-  add(line_plot(json, "Queues: treelets that have any waiting", "treelets", "treelets_waiting_count", false, queues));
+  add(line_plot(json, "Queues: treelets that have any waiting", "treelets", "treelets_waiting_count", false,
+                queues));
   add(line_plot(json, "Paths in flight", "paths", "paths_in_flight_count", false, always));
   add(line_plot(json, "The page cache", "bytes", "cache_bytes", true, always));
   add(line_plot(json, "Samples done", "samples", "samples_done_count", false, always));
   if (!section.blocks.empty()) {
-    section.blocks.emplace_back(ReportText{
-        "Of the first run of each order, looked at from a thread of its own; timeline.csv has every sample. Orders that keep no "
-        "queues have no line among queues."});
+    section.blocks.emplace_back(
+        ReportText{"Of the first run of each order, looked at from a thread of its own; timeline.csv has every "
+                   "sample. Orders that keep no "
+                   "queues have no line among queues."});
   }
   return section;
 }
@@ -187,8 +189,8 @@ ReportSection heat_section(const std::string& text) {
   struct Measure {
     const char *column, *title, *unit;
   };
-  for (const Measure& measure : {Measure{"loads_count", "read from disk", "reads"},
-                                 Measure{"visits_count", "crossed by rays", "visits"}}) {
+  for (const Measure& measure :
+       {Measure{"loads_count", "read from disk", "reads"}, Measure{"visits_count", "crossed by rays", "visits"}}) {
     ReportHeatMaps block;
     std::vector<std::string> untold;
     const uint64_t end = most_of(json, measure.column);
@@ -199,18 +201,26 @@ ReportSection heat_section(const std::string& text) {
         untold.push_back(label);
         continue;
       }
-      block.maps.push_back({label + ": " + measure.title, measure.unit, heat["treelets_count"], heat["treelets_a_cell"],
-                            heat[measure.column], end});
+      block.maps.push_back({label + ": " + measure.title, measure.unit, heat["treelets_count"],
+                            heat["treelets_a_cell"], heat[measure.column], end});
     }
-    if (block.maps.empty()) return section;
-    block.caption = fmt::format("How often treelets were {}. Each square is {}, row by row as they lie in the file, where "
-                                "neighbours in the scene lie close; logarithmic, one scale for all orders. A square in the colour "
-                                "of table heads: never.",
-                                measure.title, block.maps[0].items_a_cell == 1 ? std::string("a treelet")
-                                                                : fmt::format("{} treelets", block.maps[0].items_a_cell));
-    if (!untold.empty()) {
-      block.caption += fmt::format(" Not counted by treelet in {}, where whole trees are crossed at once.", fmt::join(untold, ", "));
+    const std::string note =
+        untold.empty()
+            ? ""
+            : fmt::format("Not counted by treelet in {}, which trace a ray from its start to its end in one go.",
+                          fmt::join(untold, ", "));
+    if (block.maps.empty()) {
+      if (!note.empty()) section.blocks.emplace_back(ReportText{note});
+      continue;
     }
+    block.caption = fmt::format(
+        "How often treelets were {}. Each square is {}, row by row as they lie in the file, where "
+        "neighbours in the scene lie close; logarithmic, one scale for all orders. A square in the colour "
+        "of table heads: never.",
+        measure.title,
+        block.maps[0].items_a_cell == 1 ? std::string("a treelet")
+                                        : fmt::format("{} treelets", block.maps[0].items_a_cell));
+    if (!note.empty()) block.caption += " " + note;
     section.blocks.emplace_back(std::move(block));
   }
   return section;

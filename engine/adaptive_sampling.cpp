@@ -277,7 +277,8 @@ uint64_t AdaptiveSampling::expected_samples(uint32_t most) const {
       if (half.judging[block] != 0) times = std::max<double>(times, std::min(half.more[block], half.more_of_all));
     }
     const Block b = block_at(block);
-    sum += std::min((times - 1) * 2 * samples_, most - 2.0 * samples_) * ((b.x1 - b.x0) * (b.y1 - b.y0));
+    const double wanted = (times - 1) * 2 * samples_, left = most - 2.0 * samples_;
+    sum += std::min(std::max(0.0, wanted), std::max(0.0, left)) * ((b.x1 - b.x0) * (b.y1 - b.y0));  // 0 where wanted is no number
   }
   return static_cast<uint64_t>(sum);
 }

@@ -23,7 +23,7 @@ constexpr std::string_view kHead = R"(<!doctype html>
   --good: #1c7c4a; --bad: #b3261e; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e3e8ec; --dim: #98a4ae; --ground: #14181c; --line: #323b43;
   --head: #1c2228; --good: #5fcf94; --bad: #ff8a80; } }
-@media print { :root { --ink: #000000; --dim: #444444; --ground: #ffffff; --line: #bbbbbb; --good: #1c7c4a; --bad: #b3261e; }
+@media print { :root { --ink: #000000; --dim: #444444; --ground: #ffffff; --line: #bbbbbb; --head: #f4f4f4; --good: #1c7c4a; --bad: #b3261e; }
   html { font-size: 9px; } body { margin: 0; } tr { break-inside: avoid; } th { position: static; } }
 body { margin: 2rem; background: var(--ground); color: var(--ink);
   font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }

@@ -1,7 +1,5 @@
 #include "engine/picture_attributes.h"
 
-#include <algorithm>
-#include <array>
 #include <bit>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +7,13 @@ namespace shoal {
 namespace {
 
 using Json = nlohmann::json;
+
+/// Fails with: Json::exception.
+float float_of(const Json& bits) {
+  const auto word = bits.is_number_unsigned() ? bits.get<uint64_t>() : UINT64_MAX;
+  if (word > UINT32_MAX) throw Json::other_error::create(501, "no 32 bits", &bits);
+  return std::bit_cast<float>(static_cast<uint32_t>(word));
+}
 
 }  // namespace
 
@@ -29,12 +34,10 @@ Status read_attributes(const std::string& text, ExrImage& image) {
   try {
     json.at("text").get_to(image.text);
     for (const auto& [name, bits] : json.at("numbers").items()) {
-      image.numbers[name] = std::bit_cast<float>(bits.get<uint32_t>());
+      image.numbers[name] = float_of(bits);
     }
     for (const auto& [name, words] : json.at("matrices").items()) {
-      const auto bits = words.get<std::array<uint32_t, 16>>();
-      std::transform(bits.begin(), bits.end(), image.matrices[name].begin(),
-                     [](uint32_t word) { return std::bit_cast<float>(word); });
+      for (size_t i = 0; i < 16; ++i) image.matrices[name][i] = float_of(words.at(i));
     }
   } catch (const Json::exception&) {
     return damaged;

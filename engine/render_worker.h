@@ -269,8 +269,8 @@ void render_packet_reorder(RenderContext& context);
 void render_stream(RenderContext& context);
 void render_queued(RenderContext& context, QueuedPaths& paths, TreeletScheduler& scheduler, UsualBatches& batches);
 
-/// Runs `work(thread index)` on the threads of a render (engine/run_on_threads). Memory that runs out in one of them ends it for all: they would wait for its
-/// rays or samples for ever.
+/// Runs `work(thread index)` on the threads of a render (engine/run_on_threads). Memory that runs out in one of them ends
+/// it for all: they would wait for its rays or samples for ever.
 void run_on_threads(RenderContext& context, const std::function<void(unsigned)>& work);
 
 }  // namespace shoal

@@ -64,7 +64,7 @@ class PacketWalk : private PacketFrames {
     if (s_.waiting_count[kind] != size) kind = s_.waiting_count[0] >= s_.waiting_count[1] ? 0 : 1;
     const uint32_t count = s_.waiting_count[kind];
     std::copy_n(s_.waiting[kind], count, s_.rays);
-    touch_read(meter_, s_.waiting[kind], count * sizeof(Ray*), TouchKind::kInHand);
+    touch_write(meter_, s_.waiting[kind], count * sizeof(Ray*), TouchKind::kInHand);
     touch_write(meter_, s_.rays, count * sizeof(Ray*), TouchKind::kInHand);
     s_.waiting_count[kind] = 0;
     return count;
@@ -135,6 +135,7 @@ class PacketWalk : private PacketFrames {
     each_masked(*around.frame, rows, [&](uint32_t r, Row& from, uint32_t lane, uint32_t ray) HWY_ATTR {
       const uint32_t to = add_lane(frame, ray, r << 4 | lane);
       touch_read(meter_, &from, sizeof(Row), TouchKind::kInHand);
+      touch_ray(ray);
       touch_write(meter_, &row(frame, frame.row_count - 1), sizeof(Row), TouchKind::kInHand);
       copy_lane(from, lane, row(frame, frame.row_count - 1), to);
     });
@@ -155,8 +156,7 @@ class PacketWalk : private PacketFrames {
       const uint32_t lane = i % kRowRays, ray = from.ray[lane];
       touch_read(meter_, from.ray, sizeof(Row) - offsetof(Row, ray), TouchKind::kInHand);
       touch_write(meter_, &s_.box_tests[ray], sizeof s_.box_tests[ray], TouchKind::kInHand);
-      if (s_.scope_count > 0)
-        touch_write(meter_, &row(*scope().frame, from.outer[lane] >> 4).t, 64, TouchKind::kInHand);
+      if (s_.scope_count > 0) touch_updated(row(*scope().frame, from.outer[lane] >> 4), ray);
       s_.box_tests[ray] += from.box_tests;
       if (s_.scope_count > 0) update(*scope().frame, from.outer[lane], ray);
     }
@@ -277,7 +277,8 @@ class PacketWalk : private PacketFrames {
   HWY_NOINLINE void enter_treelet(const TreeletEntry& entry, uint32_t rows) {
     const std::byte* page = page_of(tables_, entry.treelet, stream_);
     if (HWY_UNLIKELY(page == nullptr)) return;
-    each_masked(*scope().frame, rows, [&](uint32_t, Row&, uint32_t, uint32_t ray) HWY_ATTR {
+    each_masked(*scope().frame, rows, [&](uint32_t, Row& at, uint32_t, uint32_t ray) HWY_ATTR {
+      touch_read(meter_, at.ray, sizeof at.ray, TouchKind::kInHand);
       touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
       ++s_.work[ray].treelets;
     });
@@ -314,21 +315,43 @@ class PacketWalk : private PacketFrames {
     Frame& frame = *scope().frame;
     each_masked(frame, rows, [&](uint32_t r, Row& at, uint32_t lane, uint32_t ray) HWY_ATTR {
       touch_candidates(meter_, leaf);
-      touch_read(meter_, &s_.space[ray], sizeof(RaySpace), TouchKind::kInHand);
-      touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
-      touch_read(meter_, &s_.rays[ray]->t, sizeof(float), TouchKind::kInHand);
+      touch_tested(at, ray);
       s_.work[ray].triangle_tests += leaf.triangle_count;
       counters_.simd_lanes_count += kRowRays, counters_.simd_active_lanes_count += leaf.triangle_count;
       const uint32_t candidates = find_candidates<kTest>(s_.space[ray], leaf, s_.rays[ray]->t);
       if (candidates == 0) return;
       if (test_leaf(leaf, leaf_offset(ref), candidates, ray)) {
+        touch_gone(at, ray);
         s_.gone[ray] = true;
         remove(frame, r, lane);
       }
+      touch_write(meter_, at.t, sizeof at.t, TouchKind::kInHand);
       at.t[lane] = s_.rays[ray]->t;
     });
   }
 
+  HWY_INLINE void touch_ray(uint32_t ray) {
+    touch_read(meter_, &s_.rays[ray], sizeof(Ray*), TouchKind::kInHand);
+    touch_read(meter_, &s_.rays[ray]->t, sizeof(float), TouchKind::kInHand);
+  }
+  /// A ray of the row is tested against a leaf.
+  HWY_INLINE void touch_tested(const Row& at, uint32_t ray) {
+    touch_read(meter_, at.ray, sizeof at.ray, TouchKind::kInHand);
+    touch_read(meter_, &s_.space[ray], sizeof(RaySpace), TouchKind::kInHand);
+    touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
+    touch_ray(ray);
+  }
+  HWY_INLINE void touch_gone(const Row& at, uint32_t ray) {
+    touch_write(meter_, &s_.gone[ray], sizeof s_.gone[ray], TouchKind::kInHand);
+    touch_write(meter_, &at.alive, sizeof at.alive, TouchKind::kInHand);
+  }
+  /// The row gets what the ray found in another frame.
+  HWY_INLINE void touch_updated(const Row& at, uint32_t ray) {
+    touch_ray(ray);
+    touch_read(meter_, &s_.gone[ray], sizeof s_.gone[ray], TouchKind::kInHand);
+    touch_write(meter_, at.t, sizeof at.t, TouchKind::kInHand);
+    if (s_.gone[ray]) touch_gone(at, ray);
+  }
   /// A row has rays that enter a box.
   HWY_INLINE void touch_lanes(uint32_t entered) {
     if constexpr (Meter::kMeters) meter_.log->lanes.packets.add(entered, kRowRays);

@@ -55,23 +55,22 @@ class LockStep : private Tracer<kTest, Meter> {
 };
 
 template <TriangleTest kTest, class Meter = NoTouches>
-HWY_INLINE void trace_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop,
-                                Meter meter = {}) {
+HWY_INLINE void run_lock_step(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop, Meter meter = {}) {
   LockStep<kTest, Meter> lanes(jobs, counters, meter);
   loop == InnerLoop::kWhileWhile ? lanes.while_while() : lanes.if_if();
 }
 
 void lock_step_watertight(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop) {
-  trace_lock_step<TriangleTest::kWatertight>(jobs, counters, loop);
+  run_lock_step<TriangleTest::kWatertight>(jobs, counters, loop);
 }
 void lock_step_fast(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop) {
-  trace_lock_step<TriangleTest::kFast>(jobs, counters, loop);
+  run_lock_step<TriangleTest::kFast>(jobs, counters, loop);
 }
 void lock_step_double(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop) {
-  trace_lock_step<TriangleTest::kDouble>(jobs, counters, loop);
+  run_lock_step<TriangleTest::kDouble>(jobs, counters, loop);
 }
 void lock_step_touching(std::span<TraceJob> jobs, TraceCounters& counters, InnerLoop loop, TouchLog& log) {
-  trace_lock_step<TriangleTest::kWatertight>(jobs, counters, loop, TouchMeter{&log});
+  run_lock_step<TriangleTest::kWatertight>(jobs, counters, loop, TouchMeter{&log});
 }
 
 }  // namespace HWY_NAMESPACE

@@ -346,15 +346,20 @@ class PacketRun : private PacketLeaves {
 
 bool has_packets() { return true; }
 
+HWY_INLINE void count_lanes(const PacketUse& use, TraceCounters& counters) {
+  counters.simd_lanes_count += kLeafLanes * use.node_visits, counters.simd_active_lanes_count += use.ray_visits;
+}
+
 void trace_packets(const SceneTables& tables, PacketState& state, uint64_t most, RayStream& stream,
                    TraceCounters& counters, PacketUse& use) {
   PacketRun<>(tables, state, stream, counters, use).run(most);
-  counters.simd_lanes_count += kLeafLanes * use.node_visits, counters.simd_active_lanes_count += use.ray_visits;
+  count_lanes(use, counters);
 }
 
 void trace_packets_touching(const SceneTables& tables, PacketState& state, uint64_t most, RayStream& stream,
                             TraceCounters& counters, PacketUse& use, TouchLog& touches) {
   PacketRun<TouchMeter>(tables, state, stream, counters, use, {&touches}).run(most);
+  count_lanes(use, counters);
 }
 
 #else

@@ -138,6 +138,7 @@ class StreamWalk {
     const RaySpace* spaces = scope().spaces;
     for (uint32_t i = 0; i < s_.count; ++i) {
       const uint32_t ray = s_.current[i];
+      touch_current(i);
       const RaySpace& space = spaces[ray];
       touch_tested(ray, space.slope, 64);  // slope, both biases, negative
       HWY_ALIGN uint32_t keys[8];
@@ -241,6 +242,7 @@ class StreamWalk {
     touch_read(meter_, &tables_.pages[entry.treelet], sizeof page, TouchKind::kTopTree);
     touch_read(meter_, &treelet.header->leaves_offset, sizeof(uint32_t), TouchKind::kNodes);
     for (uint32_t i = 0; i < s_.count; ++i) {
+      touch_current(i);
       touch_write(meter_, &s_.work[s_.current[i]], sizeof(RayWork), TouchKind::kInHand);
       ++s_.work[s_.current[i]].treelets;
     }
@@ -255,6 +257,8 @@ class StreamWalk {
     const uint32_t count = std::exchange(s_.count, 0);
     for (uint32_t i = 0; i < count; ++i) {  // reads ahead of what add_current() writes
       const uint32_t ray = s_.current[i];
+      touch_current(i);
+      touch_read(meter_, &s_.rays[ray], sizeof(Ray*), TouchKind::kInHand);
       touch_write(meter_, s_.rays[ray], sizeof(Ray), TouchKind::kInHand);
       touch_write(meter_, &s_.object[ray], sizeof(RaySpace), TouchKind::kInHand);
       s_.rays[ray]->instance = instance;
@@ -271,17 +275,24 @@ class StreamWalk {
     counters_.simd_active_lanes_count += uint64_t{leaf.triangle_count} * s_.count;
     for (uint32_t i = 0; i < s_.count; ++i) {
       const uint32_t ray = s_.current[i];
+      touch_current(i);
       touch_candidates(meter_, leaf);
       touch_tested(ray, &s_.object[ray], sizeof(RaySpace));
       s_.work[ray].triangle_tests += leaf.triangle_count;
       const uint32_t candidates = find_candidates<kTest>(s_.object[ray], leaf, s_.rays[ray]->t);
-      if (candidates != 0) s_.gone[ray] = test_leaf(leaf, leaf_offset(ref), candidates, ray);
+      if (candidates == 0) continue;
+      touch_write(meter_, &s_.gone[ray], sizeof s_.gone[ray], TouchKind::kInHand);
+      s_.gone[ray] = test_leaf(leaf, leaf_offset(ref), candidates, ray);
     }
   }
 
+  HWY_INLINE void touch_current(uint32_t i) {
+    touch_read(meter_, &s_.current[i], sizeof s_.current[i], TouchKind::kInHand);
+  }
   /// What a test of boxes or of a leaf reads of a ray of the current list, and where it counts.
   HWY_INLINE void touch_tested(uint32_t ray, const void* space, size_t bytes) {
     touch_read(meter_, space, bytes, TouchKind::kInHand);
+    touch_read(meter_, &s_.rays[ray], sizeof(Ray*), TouchKind::kInHand);
     touch_read(meter_, &s_.rays[ray]->t, sizeof(float), TouchKind::kInHand);
     touch_write(meter_, &s_.work[ray], sizeof(RayWork), TouchKind::kInHand);
   }

@@ -1,11 +1,13 @@
 // The kernels of tracing, telling a TouchLog every byte that they touch: the very templates behind TopTree::next(),
-// trace_treelets(), SceneTracer and every SceneTraversal, compiled a second time with a meter, for the same instruction sets. So answers and
-// numbers of tests are those of the kernels to the bit. Called by engine/ray_group and benches. One thread a log.
+// trace_treelets(), SceneTracer and every SceneTraversal, compiled a second time with a meter, for the same instruction
+// sets. So answers and numbers of tests are those of the kernels to the bit. Called by engine/ray_group and benches. One
+// thread a log.
 // Cost: some three times that of the kernel, beside what the log's sink does.
 //
 // Not told: reading a second time what a step has just read (a candidate's corners after its leaf), and what lies on the
 // machine's stack for the length of one test. Rays too extreme for the vector form are traced by the scalar kernel, and
-// what they touch in the treelet is not told.
+// what they touch in the treelet is not told; nor is anything of a scene whose top tree is too deep for the stacks of
+// SceneTracer and SceneTraversal.
 #pragma once
 
 #include <span>

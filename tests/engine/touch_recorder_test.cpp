@@ -14,9 +14,9 @@
 namespace shoal {
 namespace {
 
-constexpr Order kOrders[] = {Order::kDepthFirst, Order::kSorted,        Order::kQueued,
-                             Order::kHybrid,     Order::kPacket,        Order::kPacketReorder,
-                             Order::kStream,     Order::kDepthFirstIfIf};
+constexpr Order kOrders[] = {Order::kDepthFirst, Order::kSorted,         Order::kQueued,
+                             Order::kHybrid,     Order::kPacket,         Order::kPacketReorder,
+                             Order::kStream,     Order::kDepthFirstIfIf, Order::kDepthFirstWhileWhile};
 
 CacheModel::Options small_caches() {
   return {
@@ -75,6 +75,8 @@ TEST_F(TouchRecorderTest, PicturesAndTestsAreThoseOfARunThatNobodyMeasures) {
         if (threads > 1) continue;  // who meets whom changes how far a ray looks
         EXPECT_EQ(plain.counters.total().node_tests_count, told.counters.total().node_tests_count);
         EXPECT_EQ(plain.counters.total().triangle_tests_count, told.counters.total().triangle_tests_count);
+        EXPECT_EQ(plain.counters.simd_lanes_count, told.counters.simd_lanes_count);
+        EXPECT_EQ(plain.counters.simd_active_lanes_count, told.counters.simd_active_lanes_count);
         EXPECT_EQ(plain.counters.treelet_visits_count, told.counters.treelet_visits_count);
       }
     }
@@ -110,7 +112,10 @@ TEST_F(TouchRecorderTest, TellsEveryLeafThatPacketsTest) {
       EXPECT_EQ(report.lanes.leaves.active, rays.triangle_tests_count);
       EXPECT_GT(report.lanes.packets.active, 0u);
       EXPECT_LE(report.lanes.packets.share(), 1.0);
-      EXPECT_GT(report.treelet_lines, report.lanes.leaves.offered / 16);
+      const auto fills = [&](TouchKind of) { return report.by_kind[static_cast<size_t>(of)].fills; };
+      EXPECT_GT(fills(TouchKind::kNodes) + fills(TouchKind::kPages), 0u);
+      EXPECT_GT(fills(TouchKind::kTopTree), 0u);
+      EXPECT_GT(report.treelet_lines, report.lanes.leaves.offered / 16 + rays.rays_traced_count);
     }
   }
 }
@@ -122,8 +127,7 @@ TEST_F(TouchRecorderTest, InnerLoopsTouchTheLinesOfTreeletsThatDepthFirstTouches
   const uint64_t lines = plain.report().treelet_lines;
   for (const Order order : {Order::kDepthFirstWhileWhile, Order::kDepthFirstIfIf}) {
     TouchRecorder recorder(small_caches());
-    EXPECT_EQ(render_with(scene, order, 1, &recorder).counters.total().node_tests_count,
-              rays.node_tests_count);
+    EXPECT_EQ(render_with(scene, order, 1, &recorder).counters.total().node_tests_count, rays.node_tests_count);
     EXPECT_EQ(recorder.report().treelet_lines, lines);
   }
 }

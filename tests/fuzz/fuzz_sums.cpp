@@ -34,7 +34,7 @@ void resolve(Sums& sums) {
   if (sums.aovs) (void)sums.aovs->resolve(sums.film);
 }
 
-/// As engine/render_beginning and engine/render do.
+/// Much as engine/render_beginning and engine/render do.
 Status go_on(SumsFile& file) {
   const SumsHeader& header = file.header();
   Sums sums(header);

@@ -8,7 +8,7 @@
 
 namespace shoal::fuzz {
 
-/// At most 1 MiB.
+/// What is repaired has at most 1 MiB.
 std::vector<std::byte> sums_file_of(std::span<const std::byte> input);
 
 }  // namespace shoal::fuzz
