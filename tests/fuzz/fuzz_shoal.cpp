@@ -6,9 +6,11 @@
 #include <random>
 
 #include "engine/scene.h"
+#include "io/page_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/shoal_input.h"
 #include "tests/support/memory_file_system.h"
+#include "treelets/scene_traversal.h"
 #include "treelets/trace_scene.h"
 #include "treelets/trace_treelet.h"
 
@@ -121,15 +123,21 @@ class Stream final : public RayStream {
   size_t taken_ = 0, done_count_ = 0;
 };
 
-/// From start to end, as where every page stays.
-void trace_in_memory(const Scene& scene, const Pages& pages) {
-  for (const RayGrouping grouping : {RayGrouping::kSingle, RayGrouping::kPackets}) {
-    SceneTracer tracer(scene.top_tree, pages.geometry.data(), grouping);
-    Stream stream(scene, pages);
-    TraceCounters counters;
-    tracer.trace(stream, counters);
-    require(stream.all_done());
+/// From start to end, as where every page stays: by one of the ways that there are.
+void trace_in_memory(const Scene& scene, const Pages& pages, uint64_t way) {
+  const TopTree& tree = scene.top_tree;
+  const PageTable table = pages.geometry.data();
+  constexpr auto kTest = TriangleTest::kWatertight;
+  Stream stream(scene, pages);
+  TraceCounters counters;
+  switch (way % 5) {
+    case 0: SceneTracer(tree, table, RayGrouping::kSingle).trace(stream, counters); break;
+    case 1: SceneTracer(tree, table, RayGrouping::kPackets).trace(stream, counters); break;
+    case 2: make_packet_traversal(tree, table, kTest, kLeastPacketRays)->trace(stream, counters); break;
+    case 3: make_reordering_traversal(tree, table, kTest, kLeastPacketRays)->trace(stream, counters); break;
+    default: make_stream_traversal(tree, table, kTest)->trace(stream, counters);
   }
+  require(stream.all_done());
 }
 
 }  // namespace
@@ -148,6 +156,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const shoal::fuzz::Pages pages = shoal::fuzz::read_pages(scene.value());
   (void)shoal::verify_scene(scene.value()).ok();
   shoal::fuzz::trace_by_treelets(scene.value(), pages);
-  shoal::fuzz::trace_in_memory(scene.value(), pages);
+  // Chosen by the input, so that an input is always traced in the same way.
+  shoal::fuzz::trace_in_memory(scene.value(), pages, shoal::hash_bytes(std::as_bytes(std::span(data, size))));
   return 0;
 }
