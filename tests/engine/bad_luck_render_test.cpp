@@ -143,6 +143,7 @@ TEST_F(BadLuckRender, AStopIsHeardWhereCameraRaysSeeNothing) {
     ExecutionOptions execution;
     execution.order = order;
     execution.max_memory_bytes = 256ull << 20;
+    execution.process_bytes = 16u << 20;  // a sanitizer takes hundreds of MiB for itself
     std::atomic<bool> stop = false;
     RenderHooks hooks;
     hooks.stop = &stop;

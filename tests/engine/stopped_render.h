@@ -14,6 +14,7 @@
 #include "engine/render.h"
 #include "tests/support/memory_file_system.h"
 #include "tests/support/render_variation.h"
+#include "tests/support/same_bits.h"
 #include "tests/support/temporary_folder.h"
 
 namespace shoal::testing {
@@ -110,9 +111,7 @@ class StoppedRender : public ::testing::Test {
     for (size_t i = 0; i < expected.layers.size(); ++i) {
       const ExrChannel &a = actual.layers[i], &b = expected.layers[i];
       EXPECT_EQ(a.integers, b.integers) << what << ", " << b.name;
-      ASSERT_EQ(a.values.size(), b.values.size());
-      EXPECT_EQ(std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)), 0)
-          << what << ", " << b.name;
+      EXPECT_TRUE(same_bits(a.values, b.values)) << what << ", " << b.name;
     }
   }
 
