@@ -43,6 +43,13 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts) {
   return pointers;
 }
 
+/// With a sanitizer everything takes longer.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr int kSlowness = 20;
+#else
+constexpr int kSlowness = 1;
+#endif
+
 }  // namespace
 
 Program::Program(const TemporaryFolder& folder, const std::vector<std::string>& command) {
@@ -81,7 +88,7 @@ bool Program::running() {
 
 ProgramRun Program::wait(std::chrono::seconds deadline) {
   ProgramRun run;
-  const auto end = Clock::now() + deadline;
+  const auto end = Clock::now() + kSlowness * deadline;
   while (running()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     if (Clock::now() < end || run.timed_out) continue;
