@@ -4,7 +4,7 @@
 // --tolerance, 77 where there is no valgrind. docs/measuring.md "Traffic at each level".
 //
 //   bench/check_cache_model [--triangles N] [--rays N] [--workload W] [--order depth-first] [--d1 48K:12]
-//       [--ll 256K:16] [--tolerance 0.05] [--folder DIR] [--json F]
+//       [--ll 256K:16] [--scalar] [--tolerance 0.05] [--folder DIR] [--json F]
 //
 // The program starts itself under valgrind: once with --model-into, which leaves what the model says of a pass, and
 // for two numbers of passes with --passes, whose difference is what cachegrind says of one. Both under valgrind, so

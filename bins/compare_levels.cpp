@@ -18,13 +18,11 @@ constexpr uint64_t kRaysForAllSets = 4'000'000;
 constexpr uint32_t kSetsOfManyRays = 16;
 
 /// Why this render cannot be modelled; empty: it can.
-std::string why_not(const LevelArguments& arguments, const PreparedRender& prepared,
-                    const ExecutionOptions& execution) {
+std::string why_not(const LevelArguments& arguments, const PreparedRender& prepared) {
   if (!arguments.model) return "not asked for";
   if (prepared.picture.shading.triangle_test != TriangleTest::kWatertight) {
     return "only kernels of --triangle-test watertight tell what they touch";
   }
-  if (execution.time_limit_seconds > 0) return "with a time limit a slower run is another picture";
   return "";
 }
 
@@ -65,7 +63,7 @@ Result<CacheModel::Options> LevelArguments::options(uint64_t rays) const {
 
 Result<std::vector<float>> model_order(const LevelArguments& arguments, const PreparedRender& prepared,
                                        const ExecutionOptions& execution, Console& console, LevelFigures& figures) {
-  figures.no_touches = why_not(arguments, prepared, execution);
+  figures.no_touches = why_not(arguments, prepared);
   if (!figures.no_touches.empty()) return std::vector<float>();
   SHOAL_ASSIGN_OR_RETURN(const CacheModel::Options options, arguments.options(figures.rays));
   figures.cache_source = arguments.cache_levels.empty() ? machine_cache_levels().source : "given";

@@ -108,7 +108,9 @@ Result<MergedPicture> merge_parts(FileSystem& fs, const std::vector<std::string>
   if (header.aovs != 0) aovs = std::make_unique<AovFilm>(AovSet{header.aovs}, header.width, header.height);
   for (const Part& seen : all.parts) {
     SHOAL_ASSIGN_OR_RETURN(const auto part, reopen(fs, seen));
-    if (&seen == &all.parts.front()) SHOAL_RETURN_IF_ERROR(read_attributes(part->attributes(), merged.image));
+    if (&seen == &all.parts.front() && !read_attributes(part->attributes(), merged.image).ok()) {
+      return Error{ErrorCode::kCorrupt, fmt::format("{} is damaged: its attributes are not what is written", seen.path)};
+    }
     SHOAL_RETURN_IF_ERROR(part->add_sums({film, aovs.get(), nullptr}));
     SHOAL_RETURN_IF_ERROR(part->finish());
     merged.samples = part->header().range.end;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "io/async_reader.h"
+#include "io/sanitizer_order.h"
 
 namespace shoal {
 namespace {
@@ -26,6 +27,7 @@ class UringReader final : public AsyncReader {
   void submit(const ReadRequest& request) override {
     SHOAL_CHECK(request.tag < requests_.size() && request.file->descriptor() >= 0);
     requests_[request.tag] = request;
+    tell_sanitizer_before(&requests_[request.tag]);
     const std::lock_guard lock(submit_mutex_);
     io_uring_sqe* entry = next_entry();
     io_uring_prep_read(entry, request.file->descriptor(), request.out.data(),
@@ -58,6 +60,7 @@ class UringReader final : public AsyncReader {
     }
     if (tag == kWakeTag) return std::nullopt;
     const ReadRequest& request = requests_[tag];
+    tell_sanitizer_after(&request);
     ReadCompletion completion{request.tag, {}};
     if (result < 0 || static_cast<size_t>(result) != request.out.size()) {
       completion.status = request.file->read_at(request.offset, request.out);

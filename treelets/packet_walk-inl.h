@@ -128,7 +128,7 @@ class PacketWalk : private PacketFrames {
     s_.work[ray].treelets += work.treelets;
   }
 
-  /// The rays of the masks in rows of their own, until what is above the stack as it is has been visited.
+  /// The rays of the masks go on in rows of their own until the stack is back at its present height.
   HWY_NOINLINE void reorder(uint32_t rows) {
     const PacketScope& around = scope();
     Frame& frame = open_frame();

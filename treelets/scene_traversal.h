@@ -2,11 +2,12 @@
 // to compare: each in its file, all to the same bits. Of every kind of ray, triangle test, position and coverage,
 // under instances and in motion. Called by engine/render_packet, render_packet_reorder, render_stream.
 //
-//   packet          treelets/trace_packets: N rays, one stack; a node is entered when the first ray that may enters
-//   it packet-reorder  treelets/trace_packets_reorder: every ray is known to enter or not; where fewer than half of
-//   the
-//                   lanes have a ray that does, those are copied together and go on by themselves
+// clang-format off
+//   packet          treelets/trace_packets: N rays, one stack; a node is entered when the first ray that may enters it
+//   packet-reorder  treelets/trace_packets_reorder: every ray is known to enter or not; where at most half of the lanes
+//                   have a ray that does, those are copied together and go on by themselves
 //   stream          treelets/trace_stream: a list of rays for each node
+// clang-format on
 //
 // Properties and assumptions
 //   order      rays end in any order and do not affect each other.

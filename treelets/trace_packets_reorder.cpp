@@ -12,7 +12,7 @@ HWY_BEFORE_NAMESPACE();
 namespace shoal {
 namespace HWY_NAMESPACE {
 
-/// Packets that shrink (Boulos, Wald & Benthin 2008, "Adaptive Ray Packet Reordering"): where fewer than half of
+/// Packets that shrink (Boulos, Wald & Benthin 2008, "Adaptive Ray Packet Reordering"): where at most half of
 /// the lanes of the rows in use hold a ray that enters a node, its rays are copied into full rows and go on there
 /// by themselves. They went by a threshold of a half too, for rows of 4.
 struct ReorderedPackets {

@@ -12,7 +12,7 @@ namespace {
 
 RenderOptionRules some_rules() {
   RenderOptionRules rules;
-  rules.takes_value = {{"spp", true}, {"environment", true}, {"camera", true}, {"no-denoise", false}};
+  rules.takes_value = {{"spp", true}, {"environment", true}, {"camera", true}, {"quiet", false}};
   rules.check = [](const std::string& name, const std::string& value) -> Status {
     if (name != "spp" || value.find_first_not_of("0123456789") == std::string::npos) return {};
     return Error{ErrorCode::kUsage, fmt::format("--{}: expected a number, found {}", name, value)};

@@ -360,7 +360,7 @@ void write_options(const SeedFolder& folder) {
     folder.put(name, {bytes.begin(), bytes.end()});
   };
   put("defaults.json", R"({"defaults": {"spp": 16, "environment": "sky.hdr", "camera": [0.5, -1e9, "x"]}})");
-  put("scenes.json", R"({"defaults": {}, "scenes": {"a.gltf": {"no-denoise": true}, "%41\u00e9.glb": {"spp": "2"}}})");
+  put("scenes.json", R"({"defaults": {}, "scenes": {"a.gltf": {"quiet": true}, "%41\u00e9.glb": {"spp": "2"}}})");
 }
 
 }  // namespace
