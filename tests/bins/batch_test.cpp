@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/bins/batch_folder.h"
+#include "tests/support/sanitized.h"
 
 namespace shoal::testing {
 namespace {
@@ -160,9 +161,10 @@ TEST(Batch, ADryRunWritesNothingAndLeavesOutWhatIsDone) {
 TEST(Batch, JobsShareOneBudget) {
   const BatchFolder batch;
   batch.add_scene("four.gltf", 4);
-  const ProgramRun run = batch.run({"--jobs", "2", "--max-memory", "256M", "--threads", "4"});
+  constexpr uint64_t kAll = (kSanitized ? 4096ull : 256ull) << 20;
+  const std::string all = std::to_string(kAll);
+  const ProgramRun run = batch.run({"--jobs", "2", "--max-memory", all, "--threads", "4"});
   expect_exit(run, 0);
-  constexpr uint64_t kAll = 256u << 20;
   for (const char* scene : {"deep/er/three.gltf", "four.gltf"}) {  // the first two begin together, whatever comes later
     const Json entry = batch.entry(scene);
     EXPECT_LT(entry["max_memory_bytes"].get<uint64_t>(), kAll / 2) << "the batch itself has its part";
@@ -175,12 +177,13 @@ TEST(Batch, JobsShareOneBudget) {
   }
   // With one job a scene has everything; the picture is the same.
   const auto shared = pictures_in(batch.out());
-  expect_exit(batch.run({"--max-memory", "256M", "--force"}), 0);
+  expect_exit(batch.run({"--max-memory", all, "--force"}), 0);
   EXPECT_GT(batch.entry("one.gltf")["max_memory_bytes"].get<uint64_t>(), kAll / 2);
   EXPECT_EQ(pictures_in(batch.out()), shared);
 }
 
 TEST(Batch, AShareThatIsTooSmallIsMadeUpForAlone) {
+  if (kSanitized) GTEST_SKIP() << "the smallest cap of a process changes from run to run with a sanitizer";
   const BatchFolder batch;
   put_file(batch.scenes() + "/shoal.json", R"({"scenes": {"one.gltf": {"width": 1600, "height": 1000}}})");
   const ProgramRun refused = run_shoal(

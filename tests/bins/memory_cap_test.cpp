@@ -4,17 +4,13 @@
 #include <regex>
 
 #include "tests/bins/small_scene.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/textured_quads.h"
 
 namespace shoal::testing {
 namespace {
 
-/// Sanitizers hold freed memory and shadows of it: what is resident says nothing of the program.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kResidentMemoryIsOurs = false;
-#else
-constexpr bool kResidentMemoryIsOurs = true;
-#endif
+constexpr bool kResidentMemoryIsOurs = !kSanitized;
 
 /// The number of MiB after `words`, which a refusal names; 0 when there is none.
 uint64_t named_mib(const std::string& text, const std::string& words) {

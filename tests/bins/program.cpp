@@ -14,6 +14,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/support/sanitized.h"
+
 extern char** environ;
 
 namespace shoal::testing {
@@ -43,12 +45,7 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// With a sanitizer everything takes longer.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kSlowness = 20;
-#else
-constexpr int kSlowness = 1;
-#endif
+constexpr int kSlowness = kSanitized ? 20 : 1;
 
 }  // namespace
 
