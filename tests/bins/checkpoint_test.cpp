@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/bins/batch_folder.h"
+#include "tests/support/sanitized.h"
 
 namespace shoal::testing {
 namespace {
@@ -67,7 +68,7 @@ TEST_F(CheckpointProgram, SignalsLeaveACheckpointAndResumeEndsInTheSameBits) {
   const std::vector<std::vector<std::string>> ways = {{"--order", "depth-first"},
                                                       {"--order", "sorted", "--threads", "1"},
                                                       {"--order", "hybrid"},
-                                                      {"--order", "queued", "--max-memory", "64M"}};
+                                                      {"--order", "queued", "--max-memory", kSanitized ? "1G" : "64M"}};
   std::mt19937 random(3);
   uint32_t stops = 0;
   for (const int signal : {SIGTERM, SIGINT}) {
