@@ -8,6 +8,7 @@
 
 #include "tests/bins/program.h"
 #include "tests/support/memory_group.h"
+#include "tests/support/sanitized.h"
 
 namespace shoal::testing {
 namespace {
@@ -18,6 +19,7 @@ constexpr const char* kTriangles = "700K";
 class GroupCap : public ::testing::Test {
  protected:
   void SetUp() override {
+    if (kSanitized) GTEST_SKIP() << "a sanitizer's own memory is in the group";
     const auto group = MemoryGroup::create(64 * kMiB);
     if (!group.ok()) GTEST_SKIP() << group.error().message;
     const ProgramRun made = run_shoal(folder_, {"generate", "terrain", "--triangles", kTriangles, "--out",
