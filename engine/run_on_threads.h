@@ -1,4 +1,5 @@
-// Threads of a oneTBB arena. Called by the orders (engine/render_worker) and by engine/adaptive_sampling.
+// Threads of a oneTBB arena. Called by the orders (engine/render_worker), engine/adaptive_sampling and benches, from one
+// thread at a time: the limit of threads is the process's. Cost: waking them, and waiting for the last.
 #pragma once
 
 #include <functional>

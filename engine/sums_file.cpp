@@ -31,17 +31,6 @@ uint64_t header_checksum(const SumsHeader& header) {
   return hash_of(std::as_bytes(std::span(&header, 1)).first(offsetof(SumsHeader, checksum)));
 }
 
-/// Of the whole file, from a header whose members are within their bounds.
-uint64_t file_bytes(const SumsHeader& header) {
-  uint64_t bytes = sizeof(SumsHeader) + header.identity_bytes + header.attributes_bytes + sizeof(uint64_t);
-  bytes += uint64_t{header.width} * header.height * header.halves * Film::kPixelBytes;
-  bytes += AovFilm::plane_bytes({header.aovs}, header.width, header.height);
-  if (header.is_adaptive()) {
-    bytes += AdaptiveSampling::parts_bytes(header.width, header.height, header.adaptive.drawn_count);
-  }
-  return bytes + header.unfinished_count * sizeof(UnfinishedSample);
-}
-
 /// Hashes what it writes.
 class SumsWriter {
  public:
@@ -85,6 +74,16 @@ Status write_unfinished(SumsWriter& writer, const UnfinishedPaths& unfinished) {
 }
 
 }  // namespace
+
+uint64_t sums_file_bytes(const SumsHeader& header) {
+  uint64_t bytes = sizeof(SumsHeader) + header.identity_bytes + header.attributes_bytes + sizeof(uint64_t);
+  bytes += uint64_t{header.width} * header.height * header.halves * Film::kPixelBytes;
+  bytes += AovFilm::plane_bytes({header.aovs}, header.width, header.height);
+  if (header.is_adaptive()) {
+    bytes += AdaptiveSampling::parts_bytes(header.width, header.height, header.adaptive.drawn_count);
+  }
+  return bytes + header.unfinished_count * sizeof(UnfinishedSample);
+}
 
 Status write_sums(FileSystem& fs, const std::string& path, SumsHeader header, const std::string& identity,
                   const std::string& attributes, const PictureSums& sums, const UnfinishedPaths* unfinished) {
@@ -139,8 +138,8 @@ Status SumsFile::check_header() const {
                     h.identity_bytes <= kMostTextBytes && h.attributes_bytes <= kMostTextBytes && h.seconds >= 0 &&
                     h.coarse_levels <= SampleOrder::kAllLevels;
   if (!size || !samples || !pass || !unfinished || !rest) return damaged("its header makes no sense");
-  if (file_->size_bytes() == file_bytes(h)) return {};
-  return damaged(fmt::format("expected {} bytes, found {}", file_bytes(h), file_->size_bytes()));
+  if (file_->size_bytes() == sums_file_bytes(h)) return {};
+  return damaged(fmt::format("expected {} bytes, found {}", sums_file_bytes(h), file_->size_bytes()));
 }
 
 Result<std::unique_ptr<SumsFile>> SumsFile::open(FileSystem& fs, const std::string& path) {

@@ -61,6 +61,9 @@ struct SumsHeader {
 };
 static_assert(sizeof(SumsHeader) == 256);
 
+/// Of the whole file. Requires: a header whose members are within their bounds.
+uint64_t sums_file_bytes(const SumsHeader& header);
+
 /// Where the sums of a picture are.
 struct PictureSums {
   Film& film;

@@ -13,6 +13,7 @@ constexpr double kWindowSeconds = 0.2;
 /// Shorter pieces never stand alone: chosen; a screen shows no difference.
 constexpr double kLeastSeconds = 5e-6;
 constexpr size_t kLongestEventBytes = 512;
+/// A begin and a length, each cut by less than one.
 constexpr uint64_t kGapNanoseconds = 2;
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "io/image.h"
 #include "tests/bins/small_scene.h"
+#include "tests/support/sanitized.h"
 
 namespace shoal::testing {
 namespace {
@@ -14,13 +15,8 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 
 constexpr uint64_t kMaxPixels = 1 << 20;
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr uint64_t kCapMiB = 256;  // sanitizers hold freed memory and shadows of it
-constexpr const char* kCapLine = "memory: cap 256 MiB";
-#else
-constexpr uint64_t kCapMiB = 64;
-constexpr const char* kCapLine = "memory: cap 64.0 MiB";
-#endif
+constexpr uint64_t kCapMiB = kSanitized ? 256 : 64;
+constexpr const char* kCapLine = kSanitized ? "memory: cap 256 MiB" : "memory: cap 64.0 MiB";
 
 ExrImage read_picture(const std::string& path) {
   auto image = read_exr(posix_file_system(), path, kMaxPixels);

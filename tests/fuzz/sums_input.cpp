@@ -17,15 +17,12 @@ uint64_t hash_of(std::span<const std::byte> bytes) {
   return hash.value();
 }
 
-/// As docs/file_format.md adds it up, without the checksum at the end; more than kMostBytes: too much.
+/// Of the file without the checksum at its end; more than kMostBytes: too much.
 uint64_t bytes_before_checksum(const SumsHeader& h) {
   const uint64_t pixels = uint64_t{h.width} * h.height;
   if (pixels > kMostBytes || h.halves > 2 || h.aovs >= 1u << kAovCount || h.unfinished_count > kMostBytes)
     return UINT64_MAX;
-  uint64_t bytes = sizeof(SumsHeader) + uint64_t{h.identity_bytes} + h.attributes_bytes;
-  bytes += pixels * h.halves * Film::kPixelBytes + AovFilm::plane_bytes({h.aovs}, h.width, h.height);
-  if (h.is_adaptive()) bytes += AdaptiveSampling::parts_bytes(h.width, h.height, h.adaptive.drawn_count);
-  return bytes + h.unfinished_count * sizeof(UnfinishedSample);
+  return sums_file_bytes(h) - sizeof(uint64_t);
 }
 
 Bytes repaired(Bytes bytes) {

@@ -10,6 +10,7 @@
 #include "io/page_cache.h"
 #include "tests/support/memory_file_system.h"
 #include "tests/support/paged_file.h"
+#include "tests/support/sanitized.h"
 
 namespace shoal {
 namespace {
@@ -76,9 +77,7 @@ uint64_t resident_process_bytes() {
 }
 
 TEST(PageBuffers, ResidentMemoryStaysWithinTheCacheWhateverTheSizes) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer's own memory would be counted";
-#endif
+  if (testing::kSanitized) GTEST_SKIP() << "a sanitizer's own memory would be counted";
   MemoryFileSystem fs;
   std::vector<PageSpec> pages;
   for (const uint32_t bytes : {4000u, 16384u, 60000u, 70000u, 140000u, 250000u, 300000u}) {
